@@ -34,7 +34,7 @@ from ..certificate.measures import Measurement
 from ..certificate.quantities import dimension_of
 from ..certificate.verdict import only_coarse
 from ..forces.cables import heavy_cable_pulls
-from ..forces.functional import gradient_by
+from ..forces.functional import by_rates
 from ..forces.pinching import standing_part
 from ..forces.triangles import heavy_triangle_pulls
 from ..solvers import solve_once
@@ -378,7 +378,7 @@ def measured_margin(surface: Surface, of: str | None) -> Measurement:
     walls = {(k, p.name) for k, _ in varied.parts if varied.what == k for p in end.patches if p.wall}
     for kind in ("tension", "pressure", "weight", "snow", "cable", "cable_weight"):
         names = [part.name for part in (end.cables if "cable" in kind else end.patches)]
-        across = np.array([(phi * gradient_by(end, {f"{kind}s": one})).sum() for one in np.eye(len(names))])
+        across = np.array([(phi * by_rates(end, {f"{kind}s": one})[1]).sum() for one in np.eye(len(names))])
         multiplied = [(kind, name) in {*varied.parts, *walls} for name in names]
         slopes[f"{kind}s"] = -across * np.where(multiplied, found.factor, 1.0) / along
     return Measurement(found.factor, still, slopes)

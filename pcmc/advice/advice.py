@@ -44,15 +44,24 @@ SAME = 1e-6  # of the surface's size: heights that differ by less are one
 Change = tuple[Plan, Sequence[Rise], list[str]]  # a plan, the heights that it is to have, the lines to type
 
 
-def chosen_values(plan: Plan | None, drawn: str, surface: Surface) -> list[str]:
-    """The tensions and walls that a project leaves open, a line each for the drawing's and the plan's."""
+def chosen_values(plan: Plan | None, drawn: str, surface: Surface, changed: Surface) -> list[str]:
+    """The tensions and walls that a project leaves open, a line each for the drawing's and the plan's.
+
+    ``changed`` is its ``surface`` with the tensions that were asked for: walls do not follow them.
+    """
     if plan is None:
         return []
     left_open = [divider for divider in plan.dividers if divider.wall == BALANCED]
-    chosen = [p for p in surface.patches if any(_is_wall_of(divider, p.name) for divider in left_open)]
+    pairs = list(zip(surface.patches, changed.patches, strict=True))
+    same = [a.tension == b.tension for a, b in pairs]
+    chosen = [
+        a
+        for (a, _), kept in zip(pairs, same, strict=True)
+        if kept and any(_is_wall_of(divider, a.name) for divider in left_open)
+    ]
     values = ", ".join(f"{patch.name!r} {patch.tension:g}" for patch in chosen)
-    change = "to choose one, type wall = under its divider"
-    balanced = f"walls balanced with their neighbours: {values} ({change})" if chosen else ""
+    what = "balanced with their neighbours" if all(same) else "that balance the tensions of the file"
+    balanced = f"walls {what}: {values} (to choose one, type wall = under its divider)" if chosen else ""
     return [text for text in (drawn, balanced) if text]
 
 

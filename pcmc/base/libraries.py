@@ -63,16 +63,11 @@ class ChildProcess:
         self._begun = False
 
     def call(
-        self,
-        place: Path,
-        function: str,
-        *arguments: Any,
-        limit: float | None = None,
-        memory: int | None = None,
+        self, place: Path, function: str, *given: Any, limit: float | None = None, memory: int | None = None
     ) -> Any:
         """What a function in the file ``place`` returns; the file is loaded without its package.
 
-        The arguments and the value returned are pickled. The process is killed after ``limit`` seconds; on
+        What is given and returned is pickled. The process is killed after ``limit`` seconds; on
         Linux ``memory`` are the bytes that it may use from then on, besides what it has and a gigabyte.
         ChildError if the function raises an exception, or the process ends. After another exception, such as
         KeyboardInterrupt, close the process: the next call would get this one's answer.
@@ -87,7 +82,7 @@ class ChildProcess:
             if not self._begun:
                 self.process.stdin.write(pickle.dumps(sys.path))
                 self._begun = True
-            self.process.stdin.write(pickle.dumps((str(place), function, arguments, memory)))
+            self.process.stdin.write(pickle.dumps((str(place), function, given, memory)))
             self.process.stdin.flush()
             returned, answer, trace = pickle.load(self.process.stdout)
         except (EOFError, OSError, pickle.UnpicklingError):

@@ -125,7 +125,7 @@ def weak_cable(surface: Surface) -> WeakCable | None:
     inner = fixed[topo.edges].all(axis=1) & ~topo.boundary_edge
     disc = surface.n - len(topo.edges) + surface.m == 1 and not np.ptp(topo.components)
     disc = disc and bool(topo.on_boundary[fixed].all()) and not inner.any()
-    for loop in topo.chains(topo.edges[topo.boundary_edge], np.zeros(surface.n, dtype=bool)):
+    for loop in topo.chains(topo.edges[topo.boundary_edge]):
         names, pulls = _sides(surface, loop.vertices)
         corners = surface.vertices[loop.vertices[fixed[loop.vertices]]] @ plane
         chords = np.roll(corners, -1, axis=0) - corners

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..base.arrays import Bools, Floats, Ints, kept_with_owner, read_only
 from ..base.tolerances import FORCE_ROUNDING
-from ..forces import cable_weights, cables
+from ..forces import cables
 from ..forces.cables import directions, pull_along
 from ..forces.elements import Points, add_values, energy_mesh
 from ..forces.pinching import standing_part
@@ -86,7 +86,6 @@ def support_forces(surface: Surface) -> Floats:
     tension = totals_and_gradient(mesh._replace(pressure=read_only(np.zeros(len(surface.patches)))), X)[2]
     cable, weight, pressure = np.zeros((3, *X.shape))
     add_values(cables.elements(surface, X), cable)
-    add_values(cable_weights.elements(surface, X), weight)
     add_weights(surface, X, weight)
     pushed = mesh.pressure[mesh.patch, None, None] * Points.of(mesh, X).area
     np.add.at(pressure, mesh.faces, np.einsum("qk,eqd->ekd", mesh.shapes.value, pushed))

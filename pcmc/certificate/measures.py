@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
-from ..forces.functional import gradient_by, weighted
+from ..forces.functional import by_rates, weighted
 from ..forces.rooms import pressure_shares
 from ..forces.volume_below import volume_below_gradient, volumes_below
 from ..surface import Surface
@@ -258,7 +258,7 @@ def _length(surface: Surface, of: str) -> Measurement:
     """The length L of a cable."""
     cable, one = _chosen_cable(surface, of)
     length = segment_lengths(surface.vertices, cable.edges).sum()
-    return Measurement(float(length), gradient_by(surface, {"cables": one}))
+    return Measurement(float(length), by_rates(surface, {"cables": one})[1])
 
 
 def _force(surface: Surface, of: str) -> Measurement:

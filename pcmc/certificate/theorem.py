@@ -22,7 +22,6 @@ rounding (``enclosures``; where rooms prescribe volumes, with their pressures am
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, cast
 
 import numpy as np
 
@@ -220,7 +219,7 @@ def _inertia(found: System) -> tuple[int, float, Floats]:
             if shift < 0.0 or counts[0] > 0:
                 moved = data.copy()
                 moved[diagonal] += shift
-                lu = cast(Any, solver.factor(moved)).lu
+                lu = solver.factor(moved).lu
                 if not np.array_equal(lu.perm_r, lu.perm_c):
                     raise _Unproved("a zero pivot hides the signs of the eigenvalues")
                 errors.append(backward_error(lu.L, lu.U) + U * float(np.abs(moved[diagonal]).max()))

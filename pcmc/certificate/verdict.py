@@ -181,7 +181,7 @@ def _forces_left(f: Findings) -> list[object]:
 
 def _single_precision(f: Findings) -> str:
     """That the coordinates have but the digits of .glb files, where that alone may leave the forces."""
-    X, coarser = f.surface.vertices, np.finfo(np.float32).eps / np.finfo(float).eps
+    X, coarser = f.surface.vertices[f.surface.free], np.finfo(np.float32).eps / np.finfo(float).eps
     if f.residual > NOISE * coarser * f.rounding or not np.array_equal(X, X.astype(np.float32)):
         return ""
     return "its coordinates are in single precision, as in a .glb file, which alone leaves as much"

@@ -13,9 +13,7 @@ from ..base.errors import FileError, OptionError
 from ..base.files import suffix_of
 from ..base.units import Units
 from ..certificate.certificate import require_certified
-from ..drawings.drawing_set import table_paths
-from ..drawings.net_drawings import SUFFIXES as NETS
-from ..drawings.net_drawings import TABLES, net_files
+from ..drawings.drawing_set import NET_SUFFIXES, NET_TABLES, net_files, table_paths
 from ..io import FORMATS, write
 from ..panelling.panel_net import check_grid
 from ..plot import families, panel_planarity
@@ -177,11 +175,11 @@ def _net(
 ) -> int:
     """Lay out quads or hexagons and write them."""
     for path in files:
-        suffix_of(path, NETS, "a net of panels")
+        suffix_of(path, NET_SUFFIXES, "a net of panels")
     size, pattern, direction = wanted
     check_grid(pattern, direction)
     outputs = Output(picture=picture, view=seen, sheet=sheet or "A1").paths
-    outputs += [one for path in files for one in table_paths(path, TABLES)]
+    outputs += [one for path in files for one in table_paths(path, NET_TABLES)]
     check_outputs(outputs, inputs=files_of(file))
     with working() as progress:
         roof = build.roof(arguments.load_project(file, units), progress)

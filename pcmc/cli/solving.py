@@ -112,14 +112,14 @@ def solve_(
         text = f"--folder: {file.name} writes nothing there by itself; name the files, as"
         raise OptionError(f"{text} -o {folder}/roof.obj", what="--folder", found=str(folder))
     project = with_rise(project, {"rise": rise, "apex": apex, "span_ratio": span_ratio})
-    options = dict(project.options) if method in (None, project.method) else {}
+    project = project.solved_by(method or project.method)
+    options = dict(project.options)
     if target is not None:
         options["target"] = target
     given: dict[str, Any] = {"accuracy_of": accuracy_of, "most_triangles": most_triangles}
     given["accuracy"] = ", ".join(accuracy) if accuracy else None
     project = replace(
         project,
-        method=method or project.method,
         options=options,
         wanted=replace(project.wanted, **{name: value for name, value in given.items() if value is not None}),
         mesh_check=project.mesh_check if mesh_check is None else mesh_check,

@@ -58,8 +58,9 @@ def read_patches(named: Mapping[str, Any], tensions: Any, pressures: Any) -> lis
     known = {f.name: f.default for f in fields(Patch) if f.name != "name"}
     for name, mesh in named.items():
         values = {key: mesh.attributes[key] for key in known if key in mesh.attributes} | given[name]
-        for key in [key for key, default in known.items() if default is MISSING and key not in values]:
-            _refuse(key, name, f"it has no {key}; set mesh.attributes[{key!r}], or pass {key}s=")
+        for key, default in known.items():
+            if default is MISSING and key not in values:
+                _refuse(key, name, f"it has no {key}; set mesh.attributes[{key!r}], or pass {key}s=")
         patches.append(Patch(name, **values))
     return patches
 
@@ -127,25 +128,24 @@ def read_vertices(named: Mapping[str, Any], whole: WholeMesh) -> tuple[list[Vert
         unused += len(mesh.vertex) - len(used)
         for key in filter(used.__contains__, mesh.vertex):
             row = mesh.default_vertex_attributes | mesh.vertex[key]
-            held = any(row.get(mark) for mark in HELD)
-            support = FIXED if held else SLIDING if row.get(SLIDES) else FREE
+            support = FIXED if any(map(row.get, HELD)) else SLIDING if row.get(SLIDES) else FREE
             marked |= any(mark in row for mark in (SLIDES, *HELD))
             guide, planes = row.get(GUIDE), row.get(PLANES) or ()
             if not (guide is None or _is_index(guide)):
                 _refuse(GUIDE, name, f"vertex {key}: {GUIDE!r} must be the number of a line or circle")
             if not (isinstance(planes, Sequence) and all(map(_is_index, planes))):
                 _refuse(PLANES, name, f"vertex {key}: {PLANES!r} must be a list of numbers of planes")
-            point = [row.get(axis) for axis in "xyz"]
-            if not all(isinstance(x, int | float | np.number) and math.isfinite(x) for x in point):
-                _refuse("vertices", name, f"vertex {key} is at {point}; set its x, y and z to finite numbers")
-            place = [float(x) for x in point if x is not None]
-            vertices.append(Vertex(name, key, place, support, -1 if guide is None else guide, planes))
+            given = [row.get(axis) for axis in "xyz"]
+            point = [validate.real(x) for x in given]
+            if not all(map(math.isfinite, point)):
+                at = validate.shown(given)
+                _refuse("vertices", name, f"vertex {key} is at {at}; set its x, y and z to finite numbers")
+            vertices.append(Vertex(name, key, point, support, -1 if guide is None else guide, planes))
     if not vertices:
         validate.refuse("meshes", list(named), "meshes with faces", error=SurfaceError)
-    for what, listed, numbers in (
-        (GUIDE, len(whole.guides), [vertex.guide for vertex in vertices]),
-        (PLANES, len(whole.planes), [number for vertex in vertices for number in vertex.planes]),
-    ):
+    on_planes = [number for vertex in vertices for number in vertex.planes]
+    guides = GUIDE, len(whole.guides), [vertex.guide for vertex in vertices]
+    for what, listed, numbers in (guides, (PLANES, len(whole.planes), on_planes)):
         if (largest := max(numbers, default=-1)) >= listed:
             text = f"a vertex has {what!r} {largest}, but attributes[{KEY!r}] lists only {listed} of them;"
             text = f"{text} keep the mesh that has this attribute, or remove {what!r} from the vertices"
@@ -175,22 +175,20 @@ def read_faces(named: Mapping[str, Any], X: Floats, places: Places) -> tuple[Int
 
     They are in the order of the faces' keys; if two meshes use a key, mesh by mesh.
     """
-    faces = [
-        (key, number, [places[name][v] for v in face])
-        for number, (name, mesh) in enumerate(named.items())
-        for key, face in mesh.face.items()
-    ]
+    faces = []
+    for number, (name, mesh) in enumerate(named.items()):
+        faces += [(key, number, [places[name][v] for v in face]) for key, face in mesh.face.items()]
     if len({key for key, _, _ in faces}) == len(faces):
         faces.sort(key=lambda face: face[0])
-    mesh_of_face = np.array([number for _, number, _ in faces])
-    corners = np.array(list(chain.from_iterable(face for _, _, face in faces)), dtype=np.int64)
+    keys, mesh_of_face, loops = zip(*faces, strict=True)
+    corners = np.array(list(chain.from_iterable(loops)), dtype=np.int64)
     try:
-        F, source, notes = cut_polygons(X, corners, np.array([len(face) for _, _, face in faces]))
+        F, source, notes = cut_polygons(X, corners, np.array([len(loop) for loop in loops]))
     except FileError as error:
         at = int(str(error.where))
-        text = str(error).replace(f"face {at}", f"face {faces[at][0]}", 1)
+        text = str(error).replace(f"face {at}", f"face {keys[at]}", 1)
         _refuse("faces", list(named)[mesh_of_face[at]], text)
-    return F, mesh_of_face[source], notes
+    return F, np.array(mesh_of_face)[source], notes
 
 
 def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) -> tuple[Cable, ...]:

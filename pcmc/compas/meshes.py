@@ -21,10 +21,9 @@ from ..base import validate
 from ..base.arrays import plain
 from ..base.errors import FileWarning, PcmcError, SurfaceError
 from ..certificate.forces import Forces
-from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of
+from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of, to_surface
 from ..io.reading import import_warnings
 from ..surface import Surface, expect_surface
-from ..surface.topology import topology
 from . import mesh_arrays
 from .mesh_arrays import CABLE, GUIDE, KEY, PLANES, SLIDES, TENSION
 
@@ -67,10 +66,9 @@ def to_meshes(surface: Surface) -> list[Any]:
         if field.name not in CARRIED and not empty:
             text = f"surface.{field.name}: COMPAS meshes do not carry it; write the surface as .pcmc"
             raise SurfaceError(text, what=field.name, found=value)
-    for cable in surface.cables:
-        if cable.weight:
-            text = f"cable {cable.name!r}: COMPAS meshes do not carry its weight; write the surface as .pcmc"
-            raise SurfaceError(text, what="weight", where=cable.name, found=cable.weight)
+    if heavy := next((cable for cable in surface.cables if cable.weight), None):
+        text = f"cable {heavy.name!r}: COMPAS meshes do not carry its weight; write the surface as .pcmc"
+        raise SurfaceError(text, what="weight", where=heavy.name, found=heavy.weight)
     rows, meshes = _vertex_attributes(surface), []
     for index, patch in enumerate(surface.patches):
         mesh = mesh_class(default_vertex_attributes=MARKS | QUANTITIES, name=patch.name)
@@ -138,8 +136,7 @@ def from_meshes(
     >>> from_meshes(floor).patches
     (Patch(name='floor', tension=2.0, pressure=1.0),)
     """
-    named = mesh_arrays.named_meshes(meshes)
-    validate.flag("weld", weld)
+    named, weld = mesh_arrays.named_meshes(meshes), validate.flag("weld", weld)
     try:
         surface, notes = _surface(named, tensions, pressures, weld)
     except (TypeError, ValueError, LookupError, AttributeError, OverflowError) as error:
@@ -171,22 +168,13 @@ def _surface(
     if unused:
         notes = (*notes, f"{unused} vertices that no face uses were left out")
     if not marked:
-        support = np.where(topology(F, patch, n).on_boundary, FIXED, support)
         notes = (*notes, "no vertex has the attribute is_support, so the boundary is taken as fixed")
-    notes = (*notes, *import_warnings(MeshData(X, F, patch, patches, support if marked else None)))
-    surface = Surface(
-        X,
-        F,
-        patch,
-        patches,
-        support == FIXED,
-        support == SLIDING,
-        whole.plane,
-        tuple((one, guide == number) for number, one in enumerate(whole.guides)),
-        tuple(zip(whole.planes, on_planes, strict=True)),
-        mesh_arrays.read_cables(named, places, whole.cables),
-        whole.rooms,
-    )
+    lines = tuple((one, guide == number) for number, one in enumerate(whole.guides))
+    planes = tuple(zip(whole.planes, on_planes, strict=True))
+    about: dict[str, Any] = {"plane": whole.plane, "lines": lines, "planes": planes, "rooms": whole.rooms}
+    about["cables"] = mesh_arrays.read_cables(named, places, whole.cables)
+    data = MeshData(X, F, patch, patches, support if marked else None, **about)
+    surface, notes = to_surface(data), (*notes, *import_warnings(data))
     of_key = {key: k for of_mesh in places.values() for key, k in of_mesh.items()}
     try:
         drawn = [(curve, [of_key[key] for key in curve.vertices.tolist()]) for curve in whole.curves]
@@ -241,16 +229,10 @@ def solve(
         warnings.simplefilter("always")
         start = from_meshes(meshes, tensions=tensions, pressures=pressures, weld=weld)
         result = pcmc.solve(start, **options)
-        return {
-            "meshes": to_meshes(result.surface),
-            "converged": result.converged,
-            "status": result.status.name.lower(),
-            "message": result.message,
-            "energy": result.energy,
-            "iterations": result.iterations,
-            "certificate": _plain_certificate(result.certificate),
-            "warnings": [str(one.message) for one in caught],
-        }
+        answer = {key: getattr(result, key) for key in ("converged", "message", "energy", "iterations")}
+        answer |= {"meshes": to_meshes(result.surface), "status": result.status.name.lower()}
+        answer["certificate"] = _plain_certificate(result.certificate)
+        return answer | {"warnings": [str(one.message) for one in caught]}
 
 
 def certify(
@@ -307,5 +289,5 @@ def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False, **optio
 
 
 def _plain_certificate(found: pcmc.Certificate) -> dict[str, Any]:
-    tables = {name: getattr(found, name) for name in ("patches", "junctions", "boundaries", "supports")}
-    return dict(plain({"certified": found.certified, **found.numbers(), "detail": found.detail, **tables}))
+    told = ("certified", "detail", "patches", "junctions", "boundaries", "supports")
+    return dict(plain({**found.numbers(), **{name: getattr(found, name) for name in told}}))

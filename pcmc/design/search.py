@@ -7,7 +7,7 @@ a solve from the last solution. Sheets are nearly linear in 1/α, the unknown fo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -36,7 +36,7 @@ from .targets import Parameter, Target, as_parameters, as_targets, measure
 LEAST_CHANGE = 1e-3  # part of an unknown that a step must change to be worth a solve near failing ones
 TRIES = 6  # points tried along a step, each nearer, before it is given up
 LEAST_GAIN = 1e-6  # part of φ below which a further step is not worth a solve
-DAMPING = 1e-6  # of the largest singular value: ``_metric`` chooses among steps of equal misfit
+DAMPING = 1e-6  # of the largest singular value: chooses among steps of equal misfit
 PROPORTIONAL = 0.9  # how much less it costs to change all tensions in proportion than a single one
 STIFFEN = 1.5  # factor on tensions while the surface given has no equilibrium
 STARTS = 7  # solves with stiffer tensions: 1.5⁶ is 11; if that does not help, tension is not the reason
@@ -202,8 +202,8 @@ class Search:
                 bounded = ((end <= self.bounds[0]) | (end >= self.bounds[1])).any()
                 return self.design(DesignStatus.AT_BOUND if bounded else DesignStatus.CONFLICT, here)
             plan = StepPlan.of(before if here.aims == self.targets else None, here, step)
-            if plan.at_fold:
-                change = plan.to_limit * (here.jacobian @ plan.step) * self.scale
+            if plan.to_fold is not None:
+                change = plan.to_fold * (here.jacobian @ plan.step) * self.scale
                 return self.design(DesignStatus.AT_FOLD, here, here.quantities + change)
             there = self.line_search(here, plan)
             if isinstance(there, DesignStatus):
@@ -276,10 +276,10 @@ class Search:
     def with_jacobian(self, at: Trial) -> Trial | None:
         """The trial with its derivatives; None at a fold."""
         try:
-            found = np.array([own for own, *_ in slopes(at.surface, at.aims, self.parameters)])
+            found = [own for own, *_ in slopes(at.surface, at.aims, self.parameters)]
         except SurfaceError:
             return None
-        by_unknown = found * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
+        by_unknown = np.array(found) * np.where(self.reciprocal, -(self.converted(at.x) ** 2), 1.0)
         return replace(at, jacobian=by_unknown * (at.r != 0.0)[:, None] / self.scale[:, None])
 
     def is_met(self, at: Trial) -> bool:
@@ -293,7 +293,13 @@ class Search:
         mu = DAMPING * float(np.linalg.norm(A, 2)) or 1.0
         low, high = (self.bounds - here.x) / size
         high = np.maximum(high, low + 1e-14)
-        damped = np.vstack([A, mu * _metric(self.parameters, self.reciprocal)])
+        # of equal steps the one that changes all tensions alike: sheets and walls at a junction stay nearly
+        # in balance while their tensions keep their ratios
+        alike = np.array([p.kind in ("tension", "cable") for p in self.parameters], dtype=float)
+        alike[~self.reciprocal] *= -1.0
+        square = max(1.0, float(alike @ alike))
+        metric = np.eye(len(alike)) - PROPORTIONAL * np.outer(alike, alike) / square
+        damped = np.vstack([A, mu * metric])
         right = np.append(-here.r, np.zeros(len(size)))
         least = lsq_linear(damped, right, bounds=(low, high), method="bvls", tol=1e-14)
         d = np.clip(least.x, low, high)
@@ -329,8 +335,8 @@ class Search:
     def row(self, trial: Trial) -> dict[str, Any]:
         """The row of the history for a point."""
         values = dict(zip((p.label for p in self.parameters), self.values(trial.x).tolist(), strict=True))
-        found = zip((t.label for t in self.targets), trial.quantities.tolist(), strict=bool(trial.aims))
-        return {**values, **dict(found), "status": trial.status, "misfit": trial.phi}
+        found = dict(zip((t.label for t in self.targets), trial.quantities.tolist(), strict=bool(trial.aims)))
+        return values | found | {"status": trial.status, "misfit": trial.phi}
 
     def design(self, status: DesignStatus, here: Trial, limit: Floats | None = None) -> Design:
         """The design that ends here; ``limit`` (targets,) if it is not the quantities here."""
@@ -354,15 +360,11 @@ class Search:
             "high": self.limits[:, 1],
         }
         assert isinstance(here.result, Result)
-        return Design(
-            status,
-            here.result,
-            pd.DataFrame(targets, index=[t.label for t in self.targets]),
-            pd.DataFrame(parameters, index=[p.label for p in self.parameters]),
-            self.solves,
-            pd.DataFrame([self.row(trial) for trial in self.tried]),
-            self.failure if status is DesignStatus.AT_FOLD else "",
-        )
+        pairs = (targets, self.targets), (parameters, self.parameters)
+        aims, varied = (pd.DataFrame(table, index=[each.label for each in own]) for table, own in pairs)
+        history = pd.DataFrame([self.row(trial) for trial in self.tried])
+        reason = self.failure if status is DesignStatus.AT_FOLD else ""
+        return Design(status, here.result, aims, varied, self.solves, history, reason)
 
 
 def _unsolved(surface: Surface) -> Result:
@@ -381,12 +383,3 @@ def _middle(surface: Surface, vertices: Ints, held: Bools) -> Target:
     distance = np.asarray(cKDTree(place[fixed]).query(place[free])[0])
     x, y = place[free[distance.argmax()]].tolist()
     return Target("height", (x, y))
-
-
-def _metric(parameters: Sequence[Parameter], reciprocal: Bools) -> Floats:
-    """(p,p) the norm by which the shortest of equal steps is chosen: all tensions change alike, as sheets and
-    walls at a junction stay nearly in balance while their tensions keep their ratios.
-    """
-    alike = np.array([p.kind in ("tension", "cable") for p in parameters]) * np.where(reciprocal, 1.0, -1.0)
-    square = max(1.0, float(alike @ alike))
-    return np.eye(len(alike)) - PROPORTIONAL * np.outer(alike, alike) / square

@@ -23,7 +23,7 @@ from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import AT_REST
 from ..certificate.balance import pressures_left_over
 from ..certificate.measures import Measurement
-from ..forces.functional import gradient_by
+from ..forces.functional import by_rates
 from ..stability.bordered import solve_preconditioned
 from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
@@ -108,21 +108,18 @@ def slopes(
             if left := pressures_left_over(surface.retensioned(**{parameter.key: changed})):
                 message = f"{parameter.label}: where it changes, {left}, or hold these edges"
                 raise OptionError(message, what=parameter.label)
-    motions = _responses(at, [{p.key: own} for p, own in zip(parameters, rates, strict=True)])
-    return [_slopes(at.surface, measure(at.surface, t), parameters, rates, motions) for t in targets]
+    responses = _responses(at, [{p.key: own} for p, own in zip(parameters, rates, strict=True)])
+    changes = list(zip(parameters, rates, responses, strict=True))
+    return [_slopes(at.surface, measure(at.surface, target), changes) for target in targets]
 
 
 def _slopes(
-    surface: Surface,
-    quantity: Measurement,
-    parameters: Sequence[Parameter],
-    rates: Sequence[Floats],
-    responses: Sequence[tuple[Floats, Floats]],
+    surface: Surface, quantity: Measurement, changes: list[tuple[Parameter, Floats, tuple[Floats, Floats]]]
 ) -> tuple[Floats, Floats, Floats]:
-    """``slopes`` of a measured quantity, given dX/dλ (n,3) and dδ/dλ (r,) for each parameter."""
-    slope = np.einsum("pnd,nd->p", np.stack([motion for motion, _ in responses]), quantity.by_position)
-    falling, growing = np.zeros((2, len(parameters)))
-    for k, (parameter, own, (motion, pressures)) in enumerate(zip(parameters, rates, responses, strict=True)):
+    """``slopes`` of a quantity; ``changes`` are a parameter, its rates, dX/dλ (n,3) and dδ/dλ (r,) each."""
+    slope = np.array([(motion * quantity.by_position).sum() for _, _, (motion, _) in changes])
+    falling, growing = np.zeros((2, len(changes)))
+    for k, (parameter, own, (motion, pressures)) in enumerate(changes):
         if parameter.key in quantity.by:
             slope[k] += quantity.by[parameter.key] @ own
         if "pressures" in quantity.by and surface.rooms:
@@ -161,7 +158,7 @@ def _responses(at: Equilibrium, rates: Sequence[dict[str, Floats]]) -> list[tupl
         return at.times(motion(z[:count]), z[count:])
 
     def response(of: dict[str, Floats]) -> tuple[Floats, Floats]:
-        right = np.append(-space.to_coordinates(gradient_by(surface, of)), units * of.get("volumes", 0.0))
+        right = np.append(-space.to_coordinates(by_rates(surface, of)[1]), units * of.get("volumes", 0.0))
         if not np.any(right):
             return np.zeros_like(at.X), np.zeros(len(units))
         z, residuals = solve_preconditioned(times, inverse.solve, right, ACCURACY, restart=40)

@@ -67,8 +67,7 @@ class StepPlan:
 
     step: Floats  # the Gauss-Newton step, t = 1
     first: float = 1.0  # t to try first
-    to_limit: float = 0.0  # φ/ρ over the slope; quantities linear in t have their values at the fold there
-    at_fold: bool = False  # whether the fold is so near that it is not worth a further solve
+    to_fold: float | None = None  # φ/ρ over the slope: t at the fold, if that is too near for a further solve
 
     @classmethod
     def of(cls, before: Trial | None, here: Trial, step: Floats) -> StepPlan:
@@ -86,4 +85,4 @@ class StepPlan:
             return cls(step, min(1.0, full * (1.0 - 0.5 * bend)) if bend > 0.0 else 1.0)
         gap = here.phi / bend
         first = min(1.0, FOLD_SHARE * 0.5 * full / bend)
-        return cls(step, first, gap / slope, gap < FOLD_GAP)
+        return cls(step, first, gap / slope if gap < FOLD_GAP else None)

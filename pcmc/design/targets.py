@@ -16,8 +16,7 @@ from ..surface import Surface
 
 __all__ = ["KINDS", "MEASURES", "Parameter", "Target", "as_parameters", "as_targets", "measure"]
 
-CABLE_QUANTITIES = ("sag", "length", "force")
-NAMED = {"curvature": "patch", "pressure": "room"} | dict.fromkeys(CABLE_QUANTITIES, "cable")
+NAMED = {"curvature": "patch", "pressure": "room"} | dict.fromkeys(("sag", "length", "force"), "cable")
 """Quantities of one patch, room or cable alone."""
 SHORT = {"reaction": "reaction per length"}  # names that stand for others
 
@@ -142,7 +141,7 @@ def as_targets(given: Target | Iterable[Target]) -> list[Target]:
 
 def _point(of: Any) -> tuple[float, float]:
     try:
-        x, y = (float(c) for c in of)
+        x, y = map(validate.real, of)
     except (TypeError, ValueError):
         message = f"height: expected a point (x, y) of Π, found {of!r}"
         raise OptionError(message, what="of", found=of) from None

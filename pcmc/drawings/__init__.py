@@ -4,8 +4,7 @@ Gives ``drawing_set``, ``net_drawings`` and their values to pictures and the com
 and the rooms below.
 """
 
-from .drawing_set import DrawingSet, drawing_set
-from .net_drawings import net_drawings
+from .drawing_set import DrawingSet, drawing_set, net_drawings
 from .sheet import FORMATS, Sheet
 
 __all__ = ["FORMATS", "DrawingSet", "Sheet", "drawing_set", "net_drawings"]

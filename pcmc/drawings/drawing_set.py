@@ -1,4 +1,5 @@
-"""The drawings of a roof: a model in three dimensions and sheets of paper, panels at true size too."""
+"""The drawings of a roof, or of a net of panels on it: a model in three dimensions and sheets of paper, with
+panels at true size."""
 
 from __future__ import annotations
 
@@ -19,17 +20,20 @@ from ..base.files import atomic_writes, suffix_of, writing
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate import Certificate
 from ..certificate.certificate import certified
-from ..panelling import Panels, panels
+from ..panelling import PanelNet, Panels, panels
 from ..surface import Surface, expect_surface
 from ..surface.images import expect_no_images
 from . import dxf, views
-from .panel_sheets import flat_panels, triangles_at_true_size
+from .panel_sheets import flat_panels, polygons_at_true_size, triangles_at_true_size
 from .panel_sheets import panel_sheets as panels_at_true_size
 from .sheet import FORMATS, MEMBERS, Sheet, SheetLine, add_frames, length_decimals, table_sheets
 from .sheet import write_pdf as write_pages
 
-SUFFIXES, CSV = (".dxf", ".pdf", ".svg"), ".csv"
+SUFFIXES, CSV, OBJ = (".dxf", ".pdf", ".svg"), ".csv", ".obj"
+NET_SUFFIXES = (*SUFFIXES, CSV, OBJ)
+NET_TABLES = ("", "nodes", "beams")  # of panels, nodes and beams
 SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
+Paths = Iterable[str | os.PathLike[str]]
 Ends = tuple[tuple[float, float], tuple[float, float]]
 
 
@@ -56,15 +60,14 @@ class DrawingSet:
         wanted = [(path, suffix_of(path, SUFFIXES, "a drawing")) for path in map(Path, paths)]
         document: Any = dxf.document(self) if any(suffix != ".pdf" for _, suffix in wanted) else None
         for path, suffix in wanted:
-            if suffix == ".dxf":
-                jobs.append((path, document.saveas))
-            elif suffix == ".pdf":
-                jobs.append((path, partial(write_pages, self.sheets)))
-            else:
-                many = len(self.sheets) > 1
-                for k in range(len(self.sheets)):
-                    one = path.with_name(f"{path.stem}-{k + 1}{path.suffix}") if many else path
-                    jobs.append((one, partial(dxf.write_svg, document, k)))
+            if suffix != ".svg":
+                write = partial(write_pages, self.sheets) if suffix == ".pdf" else document.saveas
+                jobs.append((path, write))
+                continue
+            for k in range(len(self.sheets)):
+                number = f"-{k + 1}" if len(self.sheets) > 1 else ""
+                one = path.with_name(f"{path.stem}{number}{path.suffix}")
+                jobs.append((one, partial(dxf.write_svg, document, k)))
         return jobs
 
     def write(self, *paths: str | os.PathLike[str]) -> list[Path]:
@@ -87,7 +90,7 @@ def table_paths(path: Path, tables: Iterable[str]) -> list[Path]:
 
 
 def document_files(
-    paths: Iterable[str | os.PathLike[str]],
+    paths: Paths,
     draw: Callable[[], DrawingSet],
     tables: Mapping[str, pd.DataFrame],
     others: Mapping[str, Callable[[Path], None]],
@@ -196,12 +199,10 @@ def drawing_set(
     setting_out = zip(points["point"], points[[*"xyz"]].to_numpy(), strict=True)
     named += [(at, name, "PCMC-POINT") for name, at in setting_out]
     levels, profiles = _levels(surface, heights, replaced), _profiles(surface, lines, replaced)
-    drawn: dict[str, list[views.DrawnView]] = {
-        "Plan": [views.plan_view(surface, curves, named)],
-        "Elevations": views.elevations(surface, curves),
-        "Sections at heights": [views.contours(surface, curves, levels)] if levels else [],
-        "Sections along lines": [view for view, _ in profiles],
-    }
+    elevations = views.elevations(surface, curves)
+    drawn = {"Plan": [views.plan_view(surface, curves, named)], "Elevations": elevations}
+    drawn["Sections at heights"] = [views.contours(surface, curves, levels)] if levels else []
+    drawn["Sections along lines"] = [view for view, _ in profiles]
     size = sheet, millimetres, scale, decimals
     sheets = [views.placed(shown, title, *size) for title, shown in drawn.items() if shown]
     tables, flat = {"Setting-out points": points}, None
@@ -215,8 +216,8 @@ def drawing_set(
         tables["Supports"] = certificate.supports[SUPPORT]
     if schedule is not None:
         families = schedule.families[["family", "count", "mirrored", *"abc", "area"]]
-        families = families.assign(family=[f"F{k}" for k in families["family"]])
-        tables["Families of panels"] = families.rename(columns={"count": "panels", "mirrored": "turned over"})
+        families = families.rename(columns={"count": "panels", "mirrored": "turned over"})
+        tables["Families of panels"] = families.assign(family=[f"F{k}" for k in families["family"]])
     heads = {"area": units.area, **dict.fromkeys(("force", *SUPPORT[-3:]), units.force)}
     for title, table in tables.items():
         sheets += table_sheets(title, table, sheet, decimals, heads)
@@ -234,10 +235,10 @@ def drawing_set(
 def _setting_out(curves: Sequence[SheetLine]) -> pd.DataFrame:
     """Vertices of the curves, each once: the ends of curves first, then along them."""
     rows: dict[int, list[Any]] = {}
-    open_ended = [c for c in curves if not (c.closed or c.layer in ("PCMC-CABLE", MEMBERS))]
-    ends = [(c, k) for c in open_ended for k in (0, -1)]
-    along = [(c, k) for c in curves for k in range(len(c.vertices))]
-    for c, k in [*ends, *along]:
+    ends = [c for c in curves if not (c.closed or c.layer in ("PCMC-CABLE", MEMBERS))]
+    places = [(c, k) for c in ends for k in (0, -1)]
+    places += [(c, k) for c in curves for k in range(len(c.vertices))]
+    for c, k in places:
         on = c.layer.removeprefix("PCMC-").lower()
         rows.setdefault(c.vertices[k], [f"P{len(rows) + 1}", *c.points[k].tolist(), on])
     return pd.DataFrame(rows.values(), columns=["point", *"xyz", "on"])
@@ -262,13 +263,9 @@ def _profiles(
     surface: Surface, lines: Sequence[Ends] | None, without: Collection[str]
 ) -> list[tuple[views.DrawnView, list[SheetLine]]]:
     """Each vertical section as a view, with its lines."""
-    given = lines is not None
-    if lines is None:
-        low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
-        x, y = map(float, 0.5 * (low + high))
-        lines = [((float(low[0]), y), (float(high[0]), y)), ((x, float(low[1])), (x, float(high[1])))]
-    profiles = []
-    for line in lines:
+    (left, front), (right, back) = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
+    x, y, profiles = 0.5 * (left + right), 0.5 * (front + back), []
+    for line in (((left, y), (right, y)), ((x, front), (x, back))) if lines is None else lines:
         ends = np.asarray(line, dtype=float)
         along = ends[1] - ends[0] if ends.shape == (2, 2) else np.zeros(2)
         length = float(np.linalg.norm(along))
@@ -278,8 +275,62 @@ def _profiles(
         normal = np.array([-along[1], along[0], 0.0])
         found = views.cut_lines(surface, np.append(ends[0], 0.0), normal, without)
         title = "from ({:.6g}, {:.6g}) towards ({:.6g}, {:.6g})".format(*ends.ravel())
-        if not found and given:
+        if not found and lines is not None:
             raise OptionError(f"lines: the section {title} misses the roof", what="lines", found=line)
         if found:
             profiles.append((views.profile(title, ends[0], along, found), found))
     return profiles
+
+
+def net_drawings(
+    net: PanelNet, units: str | Units, *, sheet: str = "A1", name: str = "", mark: str = ""
+) -> DrawingSet:
+    """The plan of a net, tables of its nodes and panels, and each panel at true size, for .dxf, .pdf, .svg.
+
+    Parameters
+    ----------
+    units : of the lengths: "m", "cm", "mm", "ft" or "in".
+    sheet : format of the sheets, "A4" to "A0".
+    name, mark : of the roof, in the title strips and on every sheet.
+
+    >>> from generators import delaunay
+    >>> from pcmc import panel_net
+    >>> drawings = net_drawings(panel_net(delaunay(exact=True), 0.9, anyway=True), "m", sheet="A0")
+    >>> [page.title for page in drawings.sheets[:3]], drawings.sheets[3].title[7:]
+    (['Panels and nodes in plan', 'Nodes', 'Panels'], ' at true size, outside up')
+    """
+    validate.choice("sheet", sheet, tuple(FORMATS))
+    length = expect_length(as_units(units).length, "drawings of panels")
+    millimetres, decimals = length_factor(length, "mm"), length_decimals(length, net.mesh.size)
+    curves = [
+        SheetLine(net.points[loop], "PCMC-PANEL", True, name=f"panel {k}")
+        for k, loop in enumerate(net.polygons, start=1)
+    ]
+    lines = [line._replace(points=line.points[:, :2]) for line in curves]
+    numbers = [(line.points.mean(axis=0), str(k), np.zeros(2)) for k, line in enumerate(lines, start=1)]
+    ends = [np.array([column.min(), column.max()]) for column in net.points[:, :2].T]
+    nodes = [(at, str(k), "PCMC-POINT") for k, at in enumerate(net.points[:, :2], start=1)]
+    plan = views.DrawnView("", lines, numbers, nodes, stations=(ends[0], ends[1]))
+    sheets = [views.placed([plan], "Panels and nodes in plan", sheet, millimetres, None, decimals)]
+    tables = [
+        ("Nodes", net.nodes[["node", *"xyz", "kind"]], dict.fromkeys("xyz", length)),
+        ("Panels", net.panels[["panel", "patch", "kind", "corners", "area"]], {"area": f"{length}²"}),
+    ]
+    for title, table, head in tables:
+        sheets += table_sheets(title, table, sheet, decimals, head)
+    panels = polygons_at_true_size(net, millimetres)
+    sheets += panels_at_true_size(panels, sheet)
+    add_frames(sheets, name, length, net.certificate, mark)
+    points = net.nodes[["node", *"xyz"]].rename(columns={"node": "point"}).astype({"point": str})
+    points = points.assign(on="panel")
+    about = net.mesh, length, net.certificate, curves
+    return DrawingSet(*about, (), points, (), None, flat_panels(panels), sheets, mark=mark)
+
+
+def net_files(
+    net: PanelNet, paths: Paths, units: str | Units, sheet: str, name: str, mark: str
+) -> list[tuple[Path, Callable[[Path], Any]]]:
+    """Each file of a net with the function that writes it; FileError for an unknown suffix."""
+    tables = dict(zip(NET_TABLES, (net.panels, net.nodes, net.beams), strict=True))
+    draw = partial(net_drawings, net, units, sheet=sheet, name=name, mark=mark)
+    return document_files(paths, draw, tables, {OBJ: partial(net.write_obj, mark=mark)}, "a net of panels")

@@ -34,15 +34,14 @@ def document(drawings: Any) -> Any:
     doc.dimstyles.new("PCMC", dxfattribs=DIMENSION)
     doc.appids.add("PCMC")
     for name, layer in LAYERS.items():
-        entry = doc.layers.add(name, color=layer.color, lineweight=layer.weight)
-        entry.description = layer.about
+        doc.layers.add(name, color=layer.color, lineweight=layer.weight).description = layer.about
     _add_model(doc.modelspace(), drawings)
     taken = {"model"}
-    for number, sheet in enumerate(drawings.sheets, start=1):
+    for number, sheet in enumerate(drawings.sheets):
         name = layout_name(sheet.title, taken)
-        if number == 1:
+        if number == 0:  # the one that every document has
             doc.layouts.rename("Layout1", name)
-        layout = doc.layouts.get(name) if number == 1 else doc.layouts.new(name)
+        layout = doc.layouts.new(name) if number else doc.layouts.get(name)
         layout.page_setup(size=sheet.size, margins=(0, 0, 0, 0), units="mm")
         _add_sheet(layout, sheet)
     return doc
@@ -72,9 +71,8 @@ def layer_name(text: str) -> str:
 
 
 def _add_model(space: Any, model: Any) -> None:
-    surface = model.surface
-    roof = surface.roof[surface.patch_of_face]
-    for corners in surface.vertices[surface.faces[roof]].tolist():
+    surface, (low, high) = model.surface, (end(model.surface.vertices, axis=0) for end in (np.min, np.max))
+    for corners in surface.vertices[surface.faces[surface.roof[surface.patch_of_face]]].tolist():
         space.add_3dface(corners, dxfattribs={"layer": "PCMC-PANEL"})
     for line in (*model.curves, *model.sections):
         layer, about = line.layer, model.members.get(line.name, {}) if line.layer == MEMBERS else {}
@@ -86,19 +84,17 @@ def _add_model(space: Any, model: Any) -> None:
         texts = [line.name, *(f"{key}: {text}" for key, text in about.items() if key != "member")]
         entity.set_xdata("PCMC", [(1000, text[:250]) for text in texts])
     height = MODEL_TEXT * surface.size
-    rows = model.points[["point", *"xyz"]].to_numpy().tolist()
-    labels = [(name, at, "PCMC-POINT") for name, *at in rows]
+    labels = [(name, at, "PCMC-POINT") for name, *at in model.points[["point", *"xyz"]].to_numpy().tolist()]
     labels += [(name, at.tolist(), "PCMC-SUPPORT") for name, at in model.marks]
     for name, at, layer in labels:
         space.add_point(at, dxfattribs={"layer": layer})
         text = space.add_text(name, height=height, dxfattribs={"layer": layer, "style": "PCMC"})
         text.set_placement((at[0] + 0.3 * height, at[1] + 0.3 * height, at[2]))
     if mark := model.certificate.mark or model.mark:
-        at, low = MODEL_MARK * surface.size, surface.vertices.min(axis=0)
+        at = MODEL_MARK * surface.size
         text = space.add_text(mark, height=at, dxfattribs={"layer": "PCMC-MARK", "style": "PCMC"})
         text.set_placement((low[0], low[1] - 2.0 * at, low[2]))
     if model.flat is not None:
-        low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
         millimetres = length_factor(model.units, "mm")
         every = np.concatenate([line.points for line in model.flat.lines]) / millimetres
         place = np.array([high[0] + 0.1 * surface.size, low[1]]) - every.min(axis=0)

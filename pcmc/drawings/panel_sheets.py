@@ -120,8 +120,7 @@ def _add_panel(sheet: Sheet, panel: FlatPanel) -> None:
     height = min(max(12.0, 0.15 * radius), 0.4 * radius, most)
     sheet.texts.append(Text(middle + np.array([0.0, 0.2 * height]), number, height, align="C"))
     if panel.below:
-        below = middle - np.array([0.0, 0.9 * height])
-        sheet.texts.append(Text(below, panel.below, 0.6 * height, align="C"))
+        sheet.texts.append(Text(middle - [0.0, 0.9 * height], panel.below, 0.6 * height, align="C"))
     for j, label in enumerate(panel.labels):
         small = min(4.0, 0.25 * radius, 0.7 * lengths[j] / (WIDTH * len(label)))
         at = corners[j] + 0.5 * edges[j] + small * inward[j]

@@ -139,14 +139,13 @@ class Dimension(NamedTuple):
 
     def drawn(self) -> tuple[list[SheetLine], Text]:
         """Its lines and its text, for files that have no dimensions of their own."""
-        ends, other = np.array([self.start, self.end]), 1 - self.axis
-        feet, beside = ends.copy(), np.zeros(2)
-        feet[:, other] = self.at
+        ends = np.array([self.start, self.end])
+        feet = ends.copy()
+        feet[:, 1 - self.axis] = self.at
         away = np.sign(feet - ends)
         lines = [feet, *np.stack([ends + away, feet + away], axis=1), *(feet[:, None] + TICK)]
-        beside[other] = SMALL if self.axis == 0 else -SMALL
-        place, turn = feet.mean(axis=0) + 0.8 * beside, 90.0 * self.axis
-        text = Text(place, self.text, layer="PCMC-DIM", align="C", turn=turn)
+        place = feet.mean(axis=0) + 0.8 * SMALL * np.array([[0.0, 1.0], [-1.0, 0.0]])[self.axis]
+        text = Text(place, self.text, layer="PCMC-DIM", align="C", turn=90.0 * self.axis)
         return [SheetLine(line, "PCMC-DIM") for line in lines], text
 
 
@@ -266,10 +265,9 @@ def table_sheets(
 
     rows = [[", ".join(filter(None, (key, (units or {}).get(key)))) for key in table.columns]]
     rows += map(list, zip(*map(texts, table.columns), strict=True))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    across = np.append(0.0, np.cumsum([(w + 2.0) * WIDTH * SMALL for w in widths]))
-    wide, high = drawing_area(name)
-    step = 1.8 * SMALL
+    widths = np.array([max(map(len, column)) for column in zip(*rows, strict=True)])
+    across = np.append(0.0, np.cumsum((widths + 2.0) * WIDTH * SMALL))
+    (wide, high), step = drawing_area(name), 1.8 * SMALL
     per_column = int(high / step) - 1
     columns = max(1, int((wide + GAP) // (across[-1] + GAP)))
     sheets = []

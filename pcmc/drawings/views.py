@@ -64,14 +64,12 @@ class DrawnView:
 def model_curves(surface: Surface, without: Collection[str] = ()) -> list[SheetLine]:
     """Ridges, where two sheets meet; rims, where one ends; lines in mirrors and of walls alone, but for those
     ``without``; cables."""
-    names = [patch.name for patch in surface.patches]
-    found = [
-        (f"PCMC-{kind}", curve, " | ".join(dict.fromkeys(names[k] for k in curve.sheets)))
-        for kind, curve in curves_by_kind(surface, without)
-    ]
-    nowhere = np.zeros(surface.n, dtype=bool)
+    found = []
+    for kind, curve in curves_by_kind(surface, without):
+        names = dict.fromkeys(surface.patches[k].name for k in curve.sheets)
+        found.append((f"PCMC-{kind}", curve, " | ".join(names)))
     for cable in surface.cables:
-        found += [("PCMC-CABLE", c, cable.name) for c in surface.topology.chains(cable.edges, nowhere)]
+        found += [("PCMC-CABLE", c, cable.name) for c in surface.topology.chains(cable.edges)]
     return [
         SheetLine(surface.vertices[c.vertices], layer, c.closed, name, tuple(c.vertices.tolist()))
         for layer, c, name in found
@@ -118,11 +116,10 @@ def plan_view(surface: Surface, curves: Lines, points: Sequence[tuple[Floats, st
     """From above: panels, curves with names of cables and members, points, places of outline and walls."""
     view = _seen("plan", surface, curves, np.eye(3)[:2], surface.roof[surface.patch_of_face])
     view.points = [(at[:2], name, layer) for at, name, layer in points]
-    middle = 0.5 * np.sum(view.box, axis=0)
     for curve in curves:
         if curve.layer in ("PCMC-CABLE", MEMBERS):
             at = curve.points[len(curve.points) // 2, :2]
-            away = at - middle
+            away = at - 0.5 * np.sum(view.box, axis=0)
             view.texts.append((at, curve.name, away / (np.linalg.norm(away) or 1.0)))
     view.stations = outline_places(curves, (1.0, 0.0, 0.0)), outline_places(curves, (0.0, 1.0, 0.0))
     return view
@@ -170,12 +167,7 @@ def profile(name: str, start: Floats, along: Floats, lines: Lines) -> DrawnView:
 
 
 def placed(
-    views: Sequence[DrawnView],
-    title: str,
-    name: str,
-    millimetres: float,
-    scale: int | None,
-    decimals: int,
+    views: Sequence[DrawnView], title: str, name: str, millimetres: float, scale: int | None, decimals: int
 ) -> Sheet:
     """The views on one sheet, in a grid, at one scale: the one given, or the largest that fits.
 
@@ -183,16 +175,26 @@ def placed(
     """
     boxes = [view.box for view in views]
     extent = np.max([high - low for low, high in boxes], axis=0)
-    chosen, columns = _scale(extent * millimetres, len(views), name, scale, title)
-    rows = math.ceil(len(views) / columns)
+    grids = np.array([(columns, math.ceil(len(views) / columns)) for columns in range(1, len(views) + 1)])
+    for chosen in SCALES if scale is None else (scale,):
+        factor = millimetres / chosen
+        cell = extent * factor + BEFORE + BEHIND
+        fits = {f: (grids * cell <= np.array(drawing_area(f)) + 1e-9).all(axis=1) for f in FORMATS}
+        if fits[name].any():
+            break
+    else:
+        better = next((f for f in FORMATS if fits[f].any()), None)
+        wide, high = min((grids * cell).tolist(), key=max)
+        text = f"scale: {title.lower()} at 1:{chosen} needs {wide:.0f} × {high:.0f} mm, more than {name} has;"
+        text += f" use sheet {better!r}" if better else " use a smaller scale"
+        raise OptionError(text, what="scale", found=scale, expected=better)
+    columns, rows = grids[fits[name].argmax()].tolist()
     sheet = Sheet(title, name, f"{1 / chosen:g}:1" if chosen < 1 else f"1:{chosen}")
-    factor = millimetres / chosen
-    cell = extent * factor + BEFORE + BEHIND
     origin = corner() + 0.5 * (np.array(drawing_area(name)) - np.array([columns, rows]) * cell) + BEFORE
     for k, (view, (low, high)) in enumerate(zip(views, boxes, strict=True)):
         place = origin + np.array([k % columns, rows - 1 - k // columns]) * cell
-        spare = np.array([0.5 * factor * (extent - (high - low))[0], 0.0])
-        shift = place + spare - factor * low
+        shift = place - factor * low
+        shift[0] += 0.5 * factor * (extent - (high - low))[0]
         sheet.places.append((factor, shift))
         _add_dimensions(sheet, view, factor, shift, decimals)
         if len(views) > 1:
@@ -202,29 +204,13 @@ def placed(
     return sheet
 
 
-def _scale(size: Floats, count: int, name: str, scale: int | None, title: str) -> tuple[float, int]:
-    """The scale, 1 to this, and the columns with which views of ``size`` (2,) mm fit a format."""
-    grids = np.array([(columns, math.ceil(count / columns)) for columns in range(1, count + 1)])
-    for one in SCALES if scale is None else (scale,):
-        needed = grids * (size / one + BEFORE + BEHIND)
-        fitting = {f: (needed <= np.array(drawing_area(f)) + 1e-9).all(axis=1) for f in FORMATS}
-        if fitting[name].any():
-            return one, int(grids[fitting[name].argmax(), 0])
-    better = next((f for f in FORMATS if fitting[f].any()), None)
-    wide, high = needed[needed.max(axis=1).argmin()]
-    text = f"scale: {title.lower()} at 1:{one} needs {wide:.0f} × {high:.0f} mm, more than {name} has;"
-    text += f" use sheet {better!r}" if better else " use a smaller scale"
-    raise OptionError(text, what="scale", found=scale, expected=better)
-
-
 def _add(sheet: Sheet, view: DrawnView, factor: float, shift: Floats) -> None:
     """Lines, marked points, and the names that find room: those of supports and cables first."""
     sheet.lines += [
         SheetLine(factor * line.points + shift, line.layer, line.closed)
         for line in sorted(view.lines, key=lambda line: line.layer != "PCMC-PANEL")
     ]
-    small: list[Text] = []
-    marks: list[Text] = []
+    small, marks = list[Text](), list[Text]()
     large = [
         Text(factor * at + shift + direction * [0.5 * width(text) + 1.0, SMALL], text, align="C")
         for at, text, direction in view.texts
@@ -261,8 +247,7 @@ def _add_dimensions(sheet: Sheet, view: DrawnView, factor: float, shift: Floats,
         mark = np.array([[x, y], [x + 1.2, y + 2.0], [x - 1.2, y + 2.0]])
         rule = np.array([[x - 2.0, y], [x + 18.0, y]])
         sheet.lines += [SheetLine(mark, "PCMC-DIM", True), SheetLine(rule, "PCMC-DIM")]
-        text = f"{z:+.{decimals}f}"
-        text = text if float(text) else f"±{abs(z):.{decimals}f}"
+        text = f"{z:+.{decimals}f}" if round(z, decimals) else f"±{abs(z):.{decimals}f}"
         sheet.texts.append(Text((x + 2.0, y + 0.7 * SMALL), text, layer="PCMC-DIM"))
 
 

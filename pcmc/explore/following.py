@@ -6,7 +6,7 @@ Where following leads nowhere, the walls or the start shape of the surface's pro
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -104,12 +104,12 @@ def between(start: Surface, end: Surface, part: float) -> Surface:
 
 def wanted(surface: Surface, values: Values) -> Surface:
     """The surface with other values, by kind and name; walls follow the pressures of their rooms."""
-    given = {kind: dict(values.get(kind) or {}) for kind in KINDS}
+    given: dict[str, Any] = {kind: values.get(kind) for kind in KINDS}
     changed, points = surface.retensioned(**given), values.get("points") or {}
     known = dict(zip(changeable_values(surface)["points"], single_points(surface).tolist(), strict=True))
     X = surface.vertices.copy()
     for name, place in points.items():
-        X[known[validate.choice("point", name, tuple(known))]] = place
+        X[known[validate.choice("point", name, tuple(known))]] = validate.triple(f"point {name!r}", place)
     return changed if np.array_equal(X, surface.vertices) else changed.moved(X)
 
 
@@ -144,9 +144,10 @@ class ProjectFallback:
         if way.failed is None or stop() or not self.data:
             return way, "", self
         moved = {name for name, tension in _walls(asked) if (name, tension) not in self.given}
+        left = {("tensions", name) for name, _ in _walls(asked) if name not in moved}  # to the project
         start, note = None, ""
         try:
-            project, start = self.start(asked, moved)
+            project, start = data_with_values(self.path, self.data, asked, left)[1:]
         except (PcmcError, MissingExtra) as error:
             note = f"the project's own way to these values: {error}"
         if start is not None and (new := _walls(start) - _walls(asked)):
@@ -172,15 +173,6 @@ class ProjectFallback:
         given = {wall for wall in _walls(start) if wall[0] not in moved}
         found = Reached(result.surface, result.certificate, None)
         return found, note, replace(self, given=self.given | given)
-
-    def start(self, asked: Surface, moved: Collection[str] = ()) -> tuple[projects.Project, Surface]:
-        """The project with the values of a surface, and its start shape.
-
-        Walls have the tensions that the project gives them beside the new tensions of its patches; those in
-        ``moved`` have the surface's. Errors as ``data_with_values``.
-        """
-        left = {("tensions", name) for name, _ in _walls(asked) if name not in moved}
-        return data_with_values(self.path, self.data, asked, left)[1:]
 
 
 def _walls(surface: Surface) -> frozenset[tuple[str, float]]:

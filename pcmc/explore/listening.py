@@ -18,10 +18,12 @@ import socket
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import fields
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
 from pathlib import Path
+from types import NoneType
 from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
@@ -166,14 +168,12 @@ class PageHandler(BaseHTTPRequestHandler):
             case ["GET", "page", name]:
                 self._send_file(name)
             case ["GET", "api", session, "export"]:
-                suffix = parse_qs(parts.query).get("suffix", [""])[0]
-                name, body = explorer.export(session, suffix)
-                self._send(body, BYTES, f"attachment; filename*=UTF-8''{quote(name, safe='')}")
+                name, body = explorer.export(session, parse_qs(parts.query).get("suffix", [""])[0])
+                self._send(body, BYTES, name)
             case ["POST", "api", *session, act] if act in REQUESTS and len(session) == (act != "open"):
                 turn = re.fullmatch(r"(\w{1,20}) (\d{1,9})", self.headers.get("X-Turn", ""))
-                place = None if turn is None else (turn[1], int(turn[2]))
-                given = "".join(session), act, json_object(content)
-                self._send(explorer.answer(*given, self._gone, place), BYTES)
+                given = "".join(session), act, json_object(content), self._gone
+                self._send(explorer.answer(*given, turn and (turn[1], int(turn[2]))), BYTES)
             case _:
                 raise RequestError(f"there is nothing at {parts.path:.60}", HTTPStatus.NOT_FOUND)
 
@@ -185,7 +185,9 @@ class PageHandler(BaseHTTPRequestHandler):
     def _refuse(self, line: str, status: HTTPStatus) -> None:
         """Answer with one line, and close: what is left of the request must not be read as another one."""
         self.close_connection = True
-        self._send(json.dumps({"error": " ".join(line.split())}).encode(), "application/json", status=status)
+        line = " ".join(line.split())
+        line = line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}…"
+        self._send(json.dumps({"error": line}).encode(), "application/json", status=status)
 
     def _send_file(self, name: str) -> None:
         kind = MEDIA.get(Path(name).suffix)
@@ -194,12 +196,11 @@ class PageHandler(BaseHTTPRequestHandler):
             raise RequestError(f"there is no file {name!r:.60}", HTTPStatus.NOT_FOUND)
         self._send(file.read_bytes(), f"{kind}; charset=utf-8")
 
-    def _send(
-        self, body: bytes, kind: str, disposition: str = "", status: HTTPStatus = HTTPStatus.OK
-    ) -> None:
+    def _send(self, body: bytes, kind: str, file: str = "", status: HTTPStatus = HTTPStatus.OK) -> None:
+        """Answer with a body, which the browser saves under the name of a ``file`` if there is one."""
         headers = {**HEADERS, "Content-Type": kind, "Content-Length": str(len(body))}
-        if disposition:
-            headers["Content-Disposition"] = disposition
+        if file:
+            headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(file, safe='')}"
         if self.close_connection:
             headers["Connection"] = "close"
         self.server.limit(self.connection)
@@ -211,7 +212,7 @@ class PageHandler(BaseHTTPRequestHandler):
 
 
 TYPES = {"f": "<f4", "u": "<u4"}
-LONGEST_NAME = 1000  # characters
+LONGEST_LINE = 280  # characters
 MOST_AIMS = 100  # targets, and parameters, of one request
 Check = Callable[[str, Any], Any]  # the value of a key, given its place in the request; else RequestError
 
@@ -250,11 +251,6 @@ def json_object(content: bytes) -> dict[str, Any]:
     return asked
 
 
-def or_null(check: Check) -> Check:
-    """The check of a value that may be null."""
-    return lambda what, value: None if value is None else check(what, value)
-
-
 def of_type(words: str, *types: type) -> Check:
     """The check of a value of one of these types; true and false are no numbers."""
 
@@ -266,30 +262,7 @@ def of_type(words: str, *types: type) -> Check:
     return check
 
 
-whole, truth = of_type("a whole number", int), of_type("true or false", bool)
-
-
-def name(what: str, value: Any) -> str:
-    """A text that is not too long."""
-    of_type("a name", str)(what, value)
-    if len(value) > LONGEST_NAME:
-        raise RequestError(f"{what}: a name of {len(value)} characters: {value[:40]!r}...")
-    return str(value)
-
-
-def as_float(what: str, value: Any) -> float:
-    """A float."""
-    try:
-        return float(of_type("a number", int, float)(what, value))
-    except OverflowError:
-        raise RequestError(f"{what}: expected a number up to 1.8e308") from None
-
-
-def place(what: str, value: Any, words: str = "a point [x, y, z]", size: int = 3) -> list[float]:
-    """A point."""
-    if not isinstance(value, list) or len(value) != size:
-        raise RequestError(f"{what}: expected {words}, found {value!r:.60}")
-    return [as_float(what, x) for x in value]
+whole, truth, name = of_type("a whole number", int), of_type("true or false", bool), of_type("a name", str)
 
 
 def variant_name(what: str, value: Any) -> str:
@@ -300,20 +273,15 @@ def variant_name(what: str, value: Any) -> str:
     return checked_name(what, words)
 
 
-def values_by_name(check: Check) -> Check:
-    """Values by name."""
-
-    def values(kind: str, listed: Any) -> dict[str, Any]:
-        if not isinstance(listed, dict):
-            raise RequestError(f"{kind}: expected numbers by name")
-        return {name(kind, one): check(f"{kind}: {one!r}", value) for one, value in listed.items()}
-
-    return values
+def as_given(_: str, value: Any) -> Any:
+    """A value that is checked where it is used, with a tuple for a list."""
+    return tuple(value) if isinstance(value, list) else value
 
 
-def entries(keys: Mapping[str, Check], made: Callable[..., Any]) -> Check:
-    """Objects, at least one, each with the first of the keys."""
-    first = next(iter(keys))  # without it there is no object
+def entries(made: Any) -> Check:
+    """Objects of a class, at least one: their keys are its fields, and each has the first of them."""
+    first, *others = (field.name for field in fields(made))
+    keys: dict[str, Check] = {first: as_given, **{f"{other}?": as_given for other in others}}
 
     def objects(what: str, listed: Any) -> tuple[Any, ...]:
         if not isinstance(listed, list) or not listed or not all(isinstance(entry, dict) for entry in listed):
@@ -327,36 +295,19 @@ def entries(keys: Mapping[str, Check], made: Callable[..., Any]) -> Check:
     return objects
 
 
-LIMIT = or_null(as_float)
-VALUES = {f"{kind}?": values_by_name(as_float) for kind in KINDS} | {"points?": values_by_name(place)}
-LIMITS = dict.fromkeys(("value?", "at_most?", "at_least?"), LIMIT)
-OWNER = or_null(  # what a target is of: a name, or the point of a height
-    lambda what, value: (
-        name(what, value) if isinstance(value, str) else tuple(place(what, value, "a name or a point", 2))
-    )
-)
-TARGET: dict[str, Check] = {"quantity": name, "of?": OWNER, **LIMITS, "name?": name}
-TIED: Check = lambda what, value: (  # noqa: E731 — a name, or those of patches that change together
-    tuple(name(what, one) for one in value) if isinstance(value, list) else name(what, value)
-)
-PARAMETER: dict[str, Check] = {"patch": TIED, "kind?": name, "low?": LIMIT, "high?": LIMIT}
-NUMBER: dict[str, Check] = {"number": whole}
+VALUES = {f"{kind}?": of_type("numbers by name", dict) for kind in (*KINDS, "points")}
 ACTS: dict[str, dict[str, Check]] = {
-    "follow": VALUES,
-    "settle": VALUES,
-    "meet": {"targets": entries(TARGET, Target), "vary": entries(PARAMETER, Parameter)},
+    **dict.fromkeys(("follow", "settle"), VALUES),
+    "meet": {"targets": entries(Target), "vary": entries(Parameter)},
     "keep": {"name": variant_name},
-    "forget": NUMBER,
-    "recall": NUMBER,
-    "visit": NUMBER,
-    "compare": {"number?": or_null(whole)},
+    **{act: {"number": whole} for act in ("forget", "recall", "visit")},
+    "compare": {"number?": of_type("a whole number or null", int, NoneType)},
     **{act: {} for act in ("stabilise", "remesh", "undo", "redo", "reset", "stop", "state")},
 }
 """The acts of a session, with the arguments that each takes; they answer with its state."""
 REQUESTS: dict[str, dict[str, Check]] = ACTS | {
-    "open": {"session?": or_null(name)},
-    "margin": {"what": name},
-    "equilibria": {"what": name},
+    "open": {"session?": of_type("a name or null", str, NoneType)},
+    **{act: {"what": name} for act in ("margin", "equilibria")},
     "save": {"name": name, "replace?": truth},
     **{act: {} for act in ("check", "verify", "families", "news")},
 }

@@ -83,10 +83,10 @@ def _controls(surface: Surface) -> list[dict[str, Any]]:
     for number, (patch, wall) in enumerate(zip(surface.patches, surface.walls.tolist(), strict=True)):
         kinds = [kind for kind in ("tensions", "pressures", "snows", "weights") if patch.name in values[kind]]
         groups.append({"name": patch.name, "patch": number, "wall": wall, "kinds": kinds})
-    for first, *others in (("cables", "cable_weights"), ("volumes",), ("points",)):
-        for name in values[first]:
-            kinds = [first, *(kind for kind in others if name in values[kind])]
-            groups.append({"name": name, "patch": None, "wall": False, "kinds": kinds})
+    for kinds in (["cables", "cable_weights"], ["volumes"], ["points"]):
+        for name in values[kinds[0]]:
+            own = [kind for kind in kinds if name in values[kind]]
+            groups.append({"name": name, "patch": None, "wall": False, "kinds": own})
     return groups
 
 
@@ -177,20 +177,15 @@ def fields(state: SessionState, origin: Floats) -> Arrays:
     return arrays
 
 
-def member_figures(members: Sequence[PlacedMember]) -> list[dict[str, Any]]:
-    """The least and the largest normal force of each member at rest, as rows of the key figures."""
-    row = {"owner": "member", "dimension": "force"}
-    return [
-        {"quantity": f"{which} N", "of": one.name, "value": value, **row}
-        for one in members
-        for which, value in zip(("least", "largest"), one.forces or (), strict=False)
-    ]
-
-
-def member_ends(members: Sequence[PlacedMember], origin: Floats) -> Arrays:
-    """The straight pieces of members: their ends (k,3), two by two, relative to the origin."""
+def members_data(members: Sequence[PlacedMember], origin: Floats) -> tuple[list[dict[str, Any]], Arrays]:
+    """The least and the largest normal force of each member at rest, as rows of the key figures; the ends
+    (k,3) of the straight pieces of all, two by two, relative to the origin."""
+    rows, row = [], {"owner": "member", "dimension": "force"}
+    for one in members:
+        named = zip(("least", "largest"), one.forces or (), strict=False)
+        rows += [{"quantity": f"{which} N", "of": one.name, "value": value, **row} for which, value in named]
     pieces = [np.repeat(one.path - origin, 2, axis=0)[1:-1] for one in members]
-    return {"member_ends": np.concatenate(pieces)} if pieces else {}
+    return rows, {"member_ends": np.concatenate(pieces)} if pieces else {}
 
 
 def families_drawn(state: SessionState) -> Floats:

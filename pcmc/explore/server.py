@@ -33,7 +33,7 @@ LEFT_OUT = "members are left out: they are known for a part of the roof alone"
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
 SOLVES_AT_ONCE = 2
 POLL = 0.1  # seconds after which the server sees that it shall end
-Answer = tuple[dict[str, Any], page_data.Arrays]  # header and arrays; see protocol.py
+Answer = tuple[dict[str, Any], page_data.Arrays]  # header and arrays; see listening.py
 
 
 class Explorer:
@@ -177,8 +177,9 @@ class Explorer:
         outcome = self.roof.outcome
         if not moving and has_members(outcome) and page_data.whole_of(state.surface) is None:
             members = members_drawn(outcome, state.surface, state.certificate)
-            about["figures"] += page_data.member_figures(members)
-            arrays |= page_data.member_ends(members, self.origin)
+            rows, ends = page_data.members_data(members, self.origin)
+            about["figures"] += rows
+            arrays |= ends
         return about, arrays
 
     def save(self, session: Session, name: str, replace: bool = False) -> dict[str, Any]:

@@ -41,7 +41,7 @@ MOST_BYTES = 64_000_000  # of vertices in these steps
 MOST_VARIANTS = 20
 
 Found = TypeVar("Found")
-Check = Callable[[object], None]  # raises StopIteration once the page shows another surface
+Check = Callable[[object], None]  # tells a step; raises StopIteration once the page shows another surface
 Advised = Callable[[MeshCheck, Callable[[str], None]], MeshCheck]  # with what to type; tells its progress
 
 
@@ -334,23 +334,15 @@ class Session:
     def check_mesh(self, gone: Stop = lambda: False, advised: Advised = lambda c, _: c) -> MeshCheck | None:
         """The mesh check of the surface shown, with what to type of ``advised``; None if the page shows
         another one, or is closed, before."""
-
-        def checked(shown: Surface, callback: Check) -> MeshCheck:
-            return advised(check_mesh(shown, callback=callback), partial(self._tell, callback))
-
-        return self._look(checked, gone)
+        return self._look(lambda shown, check: advised(check_mesh(shown, callback=check), check), gone)
 
     def margin(self, what: str, gone: Stop = lambda: False) -> Margin | None:
         """How far the surface shown is from the edge; None as for ``check_mesh``."""
-        return self._look(partial(margin, what=what), gone)
+        return self._look(lambda shown, check: margin(shown, what, callback=check), gone)
 
     def equilibria(self, what: str, gone: Stop = lambda: False) -> Equilibria | None:
         """The equilibria at the values shown, by branches in one of these; None as for ``check_mesh``."""
-
-        def search(shown: Surface, callback: Check) -> Equilibria:
-            return find_equilibria(shown, what, callback=partial(self._tell, callback))
-
-        found = self._look(search, gone)
+        found = self._look(lambda shown, check: find_equilibria(shown, what, callback=check), gone)
         if found is None or found.stopped:
             return None
         self.found = found
@@ -361,20 +353,17 @@ class Session:
         with self.checks:
             return verify(self.surface)
 
-    def _tell(self, callback: Check, step: str) -> None:
-        self.progress = step
-        callback(step)
-
-    def _look(self, at: Callable[..., Found], gone: Stop) -> Found | None:
+    def _look(self, at: Callable[[Surface, Check], Found], gone: Stop) -> Found | None:
         shown = self.surface
 
-        def check(_: object) -> None:
+        def check(step: object) -> None:
+            self.progress = step if isinstance(step, str) else self.progress
             if self.surface is not shown or gone():
                 raise StopIteration
 
         with self.checks:
             try:
-                return at(shown, callback=check)
+                return at(shown, check)
             except (KeyboardInterrupt, StopIteration):
                 return None
             finally:

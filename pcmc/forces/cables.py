@@ -1,12 +1,15 @@
-"""The force of a cable: the part Σ τ ℓ of E over edges with a line tension τ; gradient and Hessian block.
+"""The force of a cable: the part Σ ∫ (τ + g z) ds of E, τ its line tension and g its weight per length.
 
 Along an edge of nodes x_i with shape functions N_i (``surface.lagrange``) x = Σ N_i x_i and x' = Σ N_i' x_i,
-its direction is t = x'/|x'|, and
+its direction is t = x'/|x'|, and z the height of x over Π, whose normal is n. With T = τ + g z,
 
-    ℓ = ∫ |x'|,     ∂ℓ/∂x_i = ∫ N_i' t,     ∂²ℓ/∂x_i∂x_j = ∫ N_i' N_j' (1 - t tᵀ) / |x'|
+    ∂/∂x_i = ∫ T N_i' t + g N_i |x'| n
+    ∂²/∂x_i∂x_j = ∫ T N_i' N_j' (1 - t tᵀ) / |x'| + g (N_i N_j' n tᵀ + N_i' N_j t nᵀ)
 
-over 0..1, and L has τ N_i' N_j' / |x'|. Of a straight edge from a to b, N' is -1 and 1, and |x'| = |b - a|.
-Where that is 0 an edge has no direction and contributes none of these.
+over 0..1, and L has ∫ T₊ N_i' N_j' / |x'|, T₊ = τ + max(g z, 0). Of a straight edge from a to b, N' is -1 and
+1, |x'| = |b - a| and z the height of its middle, N = ½. Where |x'| is 0 an edge has no direction and
+contributes none of these. A cable pulls with T: in its plane, where nothing else acts, it hangs in the
+catenary z + τ/g = c cosh(x/c). Where T ≤ 0 it is under compression.
 """
 
 from __future__ import annotations
@@ -25,35 +28,42 @@ from .elements import Elements
 
 
 def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
-    """Σ τ ℓ at X (n,3).
+    """Σ ∫ (τ + g z) ds at X (n,3).
 
     >>> from pcmc import Cable, Patch
-    >>> right = Surface([[0, 0, 0], [4, 0, 0], [0, 3, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], [0],
-    ...                 cables=[Cable("edge", 2.0, [[1, 2]])])
-    >>> [cable] = elements(right, right.vertices)
-    >>> cable.value.tolist(), (cable.gradient() + 0.0).tolist()
-    ([10.0], [[[1.6, -1.2, 0.0], [-1.6, 1.2, 0.0]]])
+    >>> high = Surface([[0, 0, 3], [4, 0, 3], [0, 3, 3]], [[0, 1, 2]], [0], [Patch("a", 1.0)], [0],
+    ...                cables=[Cable("edge", 2.0, [[1, 2]], weight=0.5)])
+    >>> [cable] = elements(high, high.vertices)
+    >>> cable.value.tolist(), cable.gradient()[0, 0].round(9).tolist()
+    ([17.5], [2.8, -2.1, 1.25])
     """
     if surface.cables:
-        yield lengths(X, surface.cable_sides.ends).times(surface.cable_sides.tension)
+        yield line_integrals(surface, X, *surface.cable_sides)
 
 
-def lengths(X: Floats, nodes: Ints) -> Elements:
-    """Σ ℓ over edges of nodes (c,p+1) at X (n,3)."""
-    _, slope, weight = side_shapes(nodes.shape[1] - 1)
+def line_integrals(surface: Surface, X: Floats, nodes: Ints, tension: Floats, weight: Floats) -> Elements:
+    """∫ (τ + g z) ds of edges of nodes (c,p+1) with tensions τ (c,) and weights g (c,) at X (n,3)."""
+    n, (N, slope, dt) = np.array(surface.plane.normal), side_shapes(nodes.shape[1] - 1)
     t, speed = along(X, nodes)
-
-    def hessian() -> Floats:
-        bend = (weight * inverse(speed))[..., None, None] * across(t)
-        return np.asarray(np.einsum("qi,qj,cqxy->cijxy", slope, slope, bend))
-
-    def stiffness() -> Floats:
-        return np.asarray(np.einsum("qi,qj,cq->cij", slope, slope, weight * inverse(speed)))
+    inverse, lift = 1.0 / np.where(speed > 0.0, speed, np.inf), weight[:, None] * dt
+    raised = lift * surface.plane.height(N @ X[nodes])
+    pull = tension[:, None] * dt + raised
 
     def gradient() -> Floats:
-        return np.asarray(np.einsum("qi,cqx->cix", slope, weight[:, None] * t))
+        down = np.einsum("qi,cq->ci", N, lift * speed)[..., None] * n
+        return np.asarray(down + np.einsum("qi,cqx->cix", slope, pull[..., None] * t))
 
-    return Elements(nodes, speed @ weight, gradient, hessian, stiffness)
+    def hessian() -> Floats:
+        across = np.eye(3) - t[..., :, None] * t[..., None, :]
+        bent = np.einsum("qi,qj,cqxy->cijxy", slope, slope, (pull * inverse)[..., None, None] * across)
+        lean = np.einsum("qi,qj,x,cqy->cijxy", N, slope, n, lift[..., None] * t)
+        return np.asarray(bent + lean + lean.transpose(0, 2, 1, 4, 3))
+
+    def stiffness() -> Floats:
+        positive = tension[:, None] * dt + np.maximum(raised, 0.0)
+        return np.asarray(np.einsum("qi,qj,cq->cij", slope, slope, positive * inverse))
+
+    return Elements(nodes, (pull * speed).sum(axis=1), gradient, hessian, stiffness)
 
 
 def along(X: Floats, nodes: Ints) -> tuple[Floats, Floats]:
@@ -61,16 +71,6 @@ def along(X: Floats, nodes: Ints) -> tuple[Floats, Floats]:
     x = side_shapes(nodes.shape[1] - 1)[1] @ X[nodes]
     speed = np.sqrt(np.einsum("cqx,cqx->cq", x, x))
     return x / np.where(speed > 0.0, speed, 1.0)[..., None], speed
-
-
-def inverse(length: Floats) -> Floats:
-    """1/ℓ; 0 without length."""
-    return np.asarray(1.0 / np.where(length > 0.0, length, np.inf))
-
-
-def across(t: Floats) -> Floats:
-    """(…,3,3) 1 - t tᵀ of directions (…,3)."""
-    return np.asarray(np.eye(3) - t[..., :, None] * t[..., None, :])
 
 
 def directions(X: Floats, ends: Ints) -> tuple[Floats, Floats]:
@@ -82,8 +82,6 @@ def directions(X: Floats, ends: Ints) -> tuple[Floats, Floats]:
 def cable_pulls(surface: Surface, X: Floats) -> Floats:
     """(c,) τ + g z̄, the pull of each edge of ``Surface.cable_edges`` at X (n,3), force."""
     ends, tension, weight = surface.cable_edges
-    if not weight.any():
-        return np.asarray(tension)
     return np.asarray(tension + weight * surface.plane.height(X)[ends].mean(axis=1))
 
 
@@ -114,9 +112,9 @@ def laws_on(topo: Topology, surface: Surface) -> Floats:
     if len(alone):
         i, j = (int(v) for v in ends[alone[0]])
         message = (
-            f"the cable from vertex {i} to {j} runs where no patch has a tension or a pressure;"
-            " give the patches there a tension, or remove the cable"
+            f"the cable from vertex {i} to {j} runs where no patch has a tension or a pressure; give the"
         )
+        message += " patches there a tension, or remove the cable"
         raise SurfaceError(message, what="cables", where=(i, j))
     laws = np.zeros((len(topo.edges), 2))
     laws[place] = np.stack([tension, weight], axis=1)

@@ -51,18 +51,10 @@ def _across(shapes: Shapes, q: int, i: int, u: Vector, v: Vector) -> Vector:
 
 @compiled
 def measure_elements(
-    mesh: Mesh,
-    X: Floats,
-    first: int,
-    last: int,
-    area: Floats,
-    volume: Floats,
-    moment: Floats,
-    gradient: Floats,
+    mesh: Mesh, X: Floats, first: int, last: int, area: Floats, volume: Floats, moment: Floats, out: Floats
 ) -> None:
-    """Add A, V and ∫ z dA of elements first..last to (k,) each, and ∇(αA - pV + w ∫ z dA) to (n,3).
-
-    A gradient of no rows is left out.
+    """Add A, V and ∫ z dA of elements first..last to (k,) each, and ∇(αA - pV + w ∫ z dA) to ``out``
+    (n,3), unless it has no rows.
     """
     shapes, origin, ground, n = mesh.shapes, vector(mesh.origin), vector(mesh.ground), vector(mesh.normal)
     for e in range(first, last):
@@ -75,13 +67,13 @@ def measure_elements(
             area[k] += dA * J
             volume[k] += dA * dot(x, g) / 3.0
             moment[k] += dA * z * J
-            if len(gradient) == 0:
+            if len(out) == 0:
                 continue
             pull = scaled((alpha + w * z) / J if J > 0.0 else 0.0, g)
             turning, along = sub(pull, scaled(third_p, x)), sub(scaled(w * J, n), scaled(third_p, g))
             for i in range(len(nodes)):
                 force = add(cross(turning, _across(shapes, q, i, u, v)), scaled(shapes.value[q, i], along))
-                accumulate(gradient, nodes[i], scaled(dA, force))
+                accumulate(out, nodes[i], scaled(dA, force))
 
 
 @compiled

@@ -23,7 +23,7 @@ to those of its closed star. The volume of what wraps around a cell is counted u
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -51,10 +51,6 @@ class FlatPieces(NamedTuple):
     def __bool__(self) -> bool:
         return len(self.face) > 0
 
-    def sides(self, surface: Surface) -> tuple[Ints, Ints]:
-        """The vertices a and b (h,)."""
-        return surface.faces[self.face, self.corner], surface.faces[self.face, (self.corner + 1) % 3]
-
 
 EMPTY, FLAT = np.empty(0, dtype=np.int64), np.empty((0, 3))
 NONE = FlatPieces(EMPTY, EMPTY, FLAT, EMPTY, EMPTY, FLAT)
@@ -64,7 +60,8 @@ def volumes(surface: Surface, X: Floats) -> list[tuple[Ints, Elements]]:
     """The volumes of the flat pieces, by sides and by ends, and the patch of each; vertices at X (n,3)."""
     if not (pieces := flat_pieces(surface)):
         return []
-    ends, c, vertex = np.stack(pieces.sides(surface), axis=1), pieces.apex, surface.original
+    ends = surface.faces[pieces.face[:, None], (pieces.corner[:, None] + [0, 1]) % 3]
+    c, vertex = pieces.apex, surface.original
     seen = X - surface.origin
     a, b = seen[ends[:, 0]], seen[ends[:, 1]]
 
@@ -126,8 +123,8 @@ def flat_pieces(surface: Surface) -> FlatPieces:
         touching = [other for other, there in others if (there & mask).any()]
         apex = common_point(origin + distance[k] * np.array(plane.normal), [plane, *touching]) - origin
         face, opposite = np.nonzero(chosen[topo.edge_of_face])
-        side = face, (opposite + 1) % 3, np.broadcast_to(apex, (len(face), 3))
-        columns.append((*side, *_ends(surface, side, (plane, mask), others)))
+        side = face, (opposite + 1) % 3
+        columns.append((*side, np.tile(apex, (len(face), 1)), *_ends(surface, *side, apex, plane, others)))
     if not sum(len(column[0]) for column in columns):
         return NONE
     expect_flat(surface, "boundaries that slide on planes through no common point")
@@ -156,13 +153,9 @@ def _seam_pieces(surface: Surface) -> FlatPieces:
 
 
 def _ends(
-    surface: Surface,
-    sides: tuple[Ints, Ints, Floats],
-    own: tuple[Plane, Bools],
-    others: Sequence[tuple[Plane, Bools]],
+    surface: Surface, face: Ints, corner: Ints, apex: Floats, own: Plane, others: list[tuple[Plane, Bools]]
 ) -> tuple[Ints, Ints, Floats]:
     """Where the boundary of a patch leaves the plane for another one: vertex, patch, and the normal there."""
-    face, corner, apex = sides
     k, origin = len(surface.patches), surface.origin
     tail, head = surface.faces[face, corner], surface.faces[face, (corner + 1) % 3]
     key = np.concatenate([head, tail]).astype(np.int64) * k + np.tile(surface.patch_of_face[face], 2)
@@ -172,14 +165,13 @@ def _ends(
     normal, done = np.zeros((len(places), 3)), count == 0.0
     for plane, mask in others:
         here = ~done & mask[vertex]
-        if here.any() and abs(plane.height(origin + apex[0])) <= SAME_PLACE * surface.size:
+        if here.any() and abs(plane.height(origin + apex)) <= SAME_PLACE * surface.size:
             done |= here  # the piece's last side lies in that plane, too
-        normals = np.array([own[0].normal, plane.normal])
+        normals = np.array([own.normal, plane.normal])
         if not here.any() or np.linalg.norm(np.cross(*normals)) <= PARALLEL:
             continue
-        away = -np.array([own[0].height(origin), plane.height(origin)])
-        corner_point = np.linalg.lstsq(normals, away, rcond=None)[0]
-        normal[here] = -count[here, None] / 6.0 * np.cross(corner_point, apex[0])
+        away = -np.array([own.height(origin), plane.height(origin)])
+        normal[here] = -count[here, None] / 6.0 * np.cross(np.linalg.lstsq(normals, away)[0], apex)
         done |= here
     used = normal.any(axis=1)
     return vertex[used], patch[used], normal[used]

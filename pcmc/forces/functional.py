@@ -27,12 +27,12 @@ import numpy as np
 from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from ..surface.supports import apply_supports
-from . import cable_weights, cables, flat_pieces
+from . import cables, flat_pieces
 from .elements import Elements, add_values, energy_mesh
 from .flat_pieces import add_plane_volumes
 from .triangles import add_weights, areas_and_volumes, moments, totals_and_gradient
 
-FORCES = (cables.elements, cable_weights.elements, flat_pieces.elements)
+FORCES = (cables.elements, flat_pieces.elements)
 Rates = Mapping[str, Floats]
 """Of change, by the kinds of ``pcmc.surface.values.KINDS``: one for each patch or cable."""
 
@@ -149,42 +149,25 @@ def volume(surface: Surface) -> float:
     return float(patch_volumes(surface)[~surface.auxiliary].sum())
 
 
-def energy_by(surface: Surface, rates: Rates, X: Floats) -> float:
-    """∂E/∂λ at X (n,3) by the numbers that E is linear in, whatever their values are:
+def by_rates(surface: Surface, rates: Rates, X: Floats | None = None) -> tuple[float, Floats]:
+    """∂E/∂λ and ∂∇E/∂λ (n,3) at X or where the surface is, supports not applied.
+
+    They are by the numbers that E is linear in, whatever their values are:
 
         ∂E/∂λ = Σ α̇ A - Σ (ṗ - ṡ) V + Σ ẇ ∫ z dA + Σ τ̇ L + Σ ġ ∫ z ds
 
     A prescribed volume is a condition beside E, and no part of it.
     """
-    none = np.zeros(len(surface.patches))
-    areas, volumes, _ = weighted(surface, X=X)
-    change = float(rates.get("tensions", none) @ areas)
-    change -= float((rates.get("pressures", none) - rates.get("snows", none)) @ volumes)
-    if "weights" in rates:
-        change += float(rates["weights"] @ moments(surface, X, none))
-    return change + _cables_by(surface, rates, X)
-
-
-def gradient_by(surface: Surface, rates: Rates, X: Floats | None = None) -> Floats:
-    """∂∇E/∂λ (n,3) at X or where the surface is, supports not applied."""
     X, none = surface.vertices if X is None else X, np.zeros(len(surface.patches))
-    out = np.zeros_like(X)
-    if not rates.keys().isdisjoint(("tensions", "pressures", "snows")):
-        net = rates.get("pressures", none) - rates.get("snows", none)
-        out = weighted(surface, rates.get("tensions", none), net, X)[2]
+    tensions, net = rates.get("tensions", none), rates.get("pressures", none) - rates.get("snows", none)
+    areas, volumes, out = weighted(surface, tensions, net, X)
+    change = total(tensions, areas, net, volumes)
     if "weights" in rates:
-        moments(surface, X, rates["weights"], out)
-        surface.folded(out)
-    _cables_by(surface, rates, X, out)
-    return out
-
-
-def _cables_by(surface: Surface, rates: Rates, X: Floats, gradient: Floats | None = None) -> float:
-    """Σ τ̇ L + Σ ġ ∫ z ds at X (n,3); its gradient is added to ``gradient`` (n,3) if that is given."""
+        change += float(rates["weights"] @ moments(surface, X, rates["weights"], out))
     none, elements = np.zeros(len(surface.cables)), list[Elements]()
     pulls, weights = rates.get("cables", none), rates.get("cable_weights", none)
     for cable, pull, weight in zip(surface.cables, pulls, weights, strict=True):
-        each = np.ones(len(cable.edges))
-        elements += [cables.lengths(X, cable.edges).times(pull * each)] if pull else []
-        elements += [cable_weights.height_integrals(surface, X, cable.edges, weight * each)] if weight else []
-    return add_values(elements, gradient)
+        if pull or weight:
+            each = np.full((2, len(cable.edges)), [[pull], [weight]])
+            elements.append(cables.line_integrals(surface, X, cable.edges, *each))
+    return change + add_values(elements, out), surface.folded(out)

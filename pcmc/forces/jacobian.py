@@ -14,7 +14,7 @@ The second part vanishes at rest, but for circles. Newton's method converges qua
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 
@@ -27,45 +27,10 @@ from .motion_space import MotionSpace, VertexClasses, curve_chords, normal_vecto
 from .second_variation import circle_curvatures, hessian_product
 
 
-@dataclass(frozen=True, eq=False)
-class Linearisation:
-    """Bᵀ Df[·] at one shape; made by ``linearise``."""
-
-    surface: Surface
-    classes: VertexClasses
-    space: MotionSpace
-    X: Floats
-    sheet_factor: Floats  # (n,3) (∇E - n n·∇E) / |a| where a sheet may turn; Da is multiplied with it
-    curve_rows: Ints  # (b,) numbers in ``classes.curve`` of the vertices whose curve may turn
-    curve_factor: Floats  # (b,) -(t·∇E) / |c| there, which Dc is multiplied with
-    circle_rows: Ints  # (k,) and (k,3) as ``circle_curvatures`` gives them
-    circle_factor: Floats
-
-    def times(self, d: Floats) -> Floats:
-        """Bᵀ Df[d] (size,), for a motion d (n,3) of the vertices."""
-        surface, classes, space = self.surface, self.classes, self.space
-        change = hessian_product(surface, classes.mesh(surface), self.X, d)
-        if classes.nodes.shape[1] == 3:
-
-            def work(first: int, last: int, turn: Floats) -> None:
-                faces, rows = classes.faces[first:last], classes.rows[first:last]
-                _add_turns(faces, rows, self.X, d, self.sheet_factor, turn)
-
-            turn = sum_blocks(work, len(classes.faces), self.X.shape[:1])
-        else:
-            turn = (self.sheet_factor * normal_vectors(surface, classes, self.X, d)).sum(axis=1)
-        turned = curve_chords(surface, classes, d)[self.curve_rows]
-        change[classes.curve[self.curve_rows]] += self.curve_factor[:, None] * turned
-        out = space.to_coordinates(change)
-        _add_to_first(space, turn, out)
-        out[space.start[self.circle_rows]] += (self.circle_factor * d[self.circle_rows]).sum(axis=1)
-        return out
-
-
 def linearise(
     surface: Surface, classes: VertexClasses, space: MotionSpace, X: Floats, gradient: Floats
-) -> Linearisation:
-    """The derivative of the forces of ``surface`` at X, where ∇E is ``gradient`` (n,3)."""
+) -> Callable[[Floats], Floats]:
+    """Bᵀ Df[d] (size,), as a function of the motion d (n,3), at X, where ∇E is ``gradient`` (n,3)."""
     freedom, axis = surface.admissible_at(X)
     single = (classes.kind == SHEET) & (space.dimension == 1) & (freedom > 1)
     sheet_factor, area_vector = np.zeros_like(X), normal_vectors(surface, classes, X)
@@ -75,30 +40,41 @@ def linearise(
     chord, vertices = curve_chords(surface, classes, X)[rows], classes.curve[rows]
     across = np.where((freedom == 2)[:, None], axis, 0.0)[vertices]
     chord -= np.einsum("ij,ij->i", chord, across)[:, None] * across
-    square = np.einsum("ij,ij->i", chord, chord)
-    along = np.einsum("ij,ij->i", chord, gradient[vertices])
-    circles = circle_curvatures(surface, space, X)
-    return Linearisation(surface, classes, space, X, sheet_factor, rows, -along / square, *circles)
+    curve_factor = -np.einsum("ij,ij->i", chord, gradient[vertices]) / np.einsum("ij,ij->i", chord, chord)
+    circle_rows, circle_factor = circle_curvatures(surface, space, X)
+    moves = np.flatnonzero(space.dimension)
+
+    def times(d: Floats) -> Floats:
+        change = hessian_product(surface, classes.mesh(surface), X, d)
+        if classes.nodes.shape[1] == 3:
+
+            def work(first: int, last: int, turn: Floats) -> None:
+                _add_turns(classes.faces[first:last], classes.rows[first:last], X, d, sheet_factor, turn)
+
+            turn = sum_blocks(work, len(classes.faces), X.shape[:1])
+        else:
+            turn = (sheet_factor * normal_vectors(surface, classes, X, d)).sum(axis=1)
+        change[vertices] += curve_factor[:, None] * curve_chords(surface, classes, d)[rows]
+        out = space.to_coordinates(change)
+        out[space.start[moves]] += turn[moves]
+        out[space.start[circle_rows]] += (circle_factor * d[circle_rows]).sum(axis=1)
+        return out
+
+    return times
 
 
 @compiled
 def _across_normals(
-    area_vector: Floats,
-    chosen: Bools,
-    freedom: Ints,
-    axis: Floats,
-    basis: Floats,
-    gradient: Floats,
-    out: Floats,
+    area: Floats, chosen: Bools, freedom: Ints, axis: Floats, basis: Floats, gradient: Floats, out: Floats
 ) -> None:
-    """``Linearisation.sheet_factor``, where a plane lets the normal turn only along itself."""
-    for v in range(len(area_vector)):
+    """Write (∇E - n n·∇E) / |a| to out where a sheet may turn, in a plane along it; ``area`` (n,3) has a."""
+    for v in range(len(area)):
         if not chosen[v]:
             continue
-        b, g, length, shadow = vector(basis[v, 0]), point(gradient, v), norm(point(area_vector, v)), 1.0
+        b, g, length, shadow = vector(basis[v, 0]), point(gradient, v), norm(point(area, v)), 1.0
         rest = sub(g, scaled(dot(b, g), b))
         if freedom[v] == 2:
-            a, n = point(axis, v), divided(point(area_vector, v), length)
+            a, n = point(axis, v), divided(point(area, v), length)
             rest = sub(rest, scaled(dot(rest, a), a))
             rest = sub(rest, scaled(dot(rest, n), n))
             shadow = norm(sub(n, scaled(dot(n, a), a)))
@@ -115,11 +91,3 @@ def _add_turns(F: Ints, rows: Ints, X: Floats, D: Floats, sheet_factor: Floats, 
         Da = scaled(0.5, cross_sum(Du, w, u, Dw))
         for corner in range(3):
             turn[rows[f, corner]] += dot(point(sheet_factor, rows[f, corner]), Da)
-
-
-@compiled
-def _add_to_first(space: MotionSpace, turn: Floats, out: Floats) -> None:
-    """Add turn (n,) to the first unknown of each vertex."""
-    for v in range(len(turn)):
-        if space.dimension[v] > 0:
-            out[space.start[v]] += turn[v]

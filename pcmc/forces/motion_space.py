@@ -27,7 +27,6 @@ from ..base.tolerances import NO_DIRECTION, ON
 from ..surface import Surface
 from ..surface.geometry import (
     accumulate,
-    add,
     cross,
     divided,
     dot,
@@ -112,10 +111,6 @@ class MotionSpace(NamedTuple):
         """B s (n,3): the vectors that have these components (size,); images have those of their vertex."""
         vectors: Floats = _to_vectors(self, components)
         return vectors[self.original] if len(self.original) else vectors
-
-    def from_other(self, other: MotionSpace, components: Floats) -> Floats:
-        """Bᵀ B' s (size,): the components here of the vectors that have these in another space."""
-        return _between(other, self, components)
 
     def project(self, vectors: Floats) -> Floats:
         """B Bᵀ v (n,3): the part of the vectors that changes the shape."""
@@ -346,16 +341,4 @@ def _to_vectors(space: MotionSpace, components: Floats) -> Floats:
     for v in range(len(space.dimension)):
         for c in range(space.dimension[v]):
             accumulate(out, v, scaled(components[space.start[v] + c], vector(space.basis[v, c])))
-    return out
-
-
-@compiled
-def _between(space: MotionSpace, other: MotionSpace, components: Floats) -> Floats:
-    out = np.empty(other.start[-1])
-    for v in range(len(space.dimension)):
-        moved = (0.0, 0.0, 0.0)
-        for c in range(space.dimension[v]):
-            moved = add(moved, scaled(components[space.start[v] + c], vector(space.basis[v, c])))
-        for c in range(other.dimension[v]):
-            out[other.start[v] + c] = dot(vector(other.basis[v, c]), moved)
     return out

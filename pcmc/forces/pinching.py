@@ -59,8 +59,7 @@ def place_wall_rows(surface: Surface, walls: Walls, X: Floats, space: MotionSpac
 
 def resting_vertices(surface: Surface, walls: Walls) -> Bools:
     """(n,) junction vertices that rest on Π, by their positions."""
-    X, held = surface.vertices, walls.held
-    gap = surface.plane.height(X)
+    X, held, gap = surface.vertices, walls.held, surface.plane.height(surface.vertices)
     gap[held] = np.linalg.norm(X[held] - X[walls.foot[held]], axis=1)
     return walls.top_free & lying(gap, X)
 
@@ -69,13 +68,6 @@ def resting_links(walls: Walls, resting: Bools) -> Ints:
     """(k,2) from each resting junction vertex to its neighbours along the junction."""
     links = np.concatenate([walls.top_edges, walls.top_edges[:, ::-1]])
     return links[resting[links[:, 0]]]
-
-
-def beside_resting(walls: Walls, resting: Bools) -> Bools:
-    """(n,) standing junction vertices next to a resting one."""
-    mask = np.zeros(len(resting), dtype=bool)
-    mask[resting_links(walls, resting)[:, 1]] = True
-    return mask & walls.top_free & ~resting
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +110,10 @@ class StandingPart:
                 curves=(),
                 **rests.resolved(whole.plane, whole.on_planes),
             )
-        links, beside = resting_links(walls, resting), beside_resting(walls, resting)
-        return cls(whole, walls, resting, surface, vertex_classes(surface, links, beside))
+        links, beside = resting_links(walls, resting), np.zeros(whole.n, dtype=bool)
+        beside[links[:, 1]] = True
+        classes = vertex_classes(surface, links, beside & walls.top_free & ~resting)
+        return cls(whole, walls, resting, surface, classes)
 
     def keep(self) -> StandingPart:
         """The same, which ``standing_part`` of the whole surface gives from now on."""
@@ -198,8 +192,8 @@ class StandingPart:
     def hardly_moves(self, before: Floats, X: Floats) -> bool:
         """Whether no top edge moves by more than ``STILL`` of the height of its wall."""
         rows = self.walls.rows
-        moved = rows.top_places(X) - rows.top_places(before)
-        return bool((np.linalg.norm(moved, axis=1) <= STILL * rows.heights(self.surface, X)).all())
+        moved, drop = rows.top_places(X) - rows.top_places(before), rows.drops(self.surface, X)
+        return bool((np.linalg.norm(moved, axis=1) <= STILL * np.linalg.norm(drop, axis=1)).all())
 
     def landed(self, X: Floats, down: Bools, space: MotionSpace | None = None) -> Floats:
         """X (n,3) with the vertices ``down`` on Π or on their bottom, and the rows of walls below.

@@ -18,7 +18,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints, hand_over, kept_with_owner
+from ..base.arrays import Floats, hand_over, kept_with_owner
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import NO_CHANGE, ON, SAME_PRESSURE
 from ..surface import Line, Surface, expect_surface
@@ -126,9 +126,9 @@ def with_room_pressures(surface: Surface, change: Floats) -> Surface:
     pressures = surface.pressures + change @ surface.room_signs
     pressures[surface.auxiliary & (np.abs(pressures) <= SAME_PRESSURE * np.abs(pressures).max())] = 0.0
     names = [patch.name for patch in surface.patches]
-    walls = surface.walls & surface.room_signs.any(axis=0)
+    walls = np.flatnonzero(surface.walls & surface.room_signs.any(axis=0))
     new = dict(zip(names, pressures.tolist(), strict=True))
-    other = surface.retensioned(None, new, [names[k] for k in np.flatnonzero(walls)])
+    other = surface.retensioned(None, new, [names[k] for k in walls])
     hand_over(surface, other, "origin", "closing_volumes")  # no pressures in a closed room change them
     return other
 
@@ -201,7 +201,13 @@ def _whole_sixths(surface: Surface) -> Floats:
         own = own[:: 1 + len(own) // MOST_FACES]
         into = signs[surface.patch_of_face[own]] < 0.0
         corners = surface.vertices[surface.faces[own]]
-        corners = _finer(np.where(into[:, None, None], corners[:, ::-1], corners), fine)
+        corners = np.where(into[:, None, None], corners[:, ::-1], corners)
+        for _ in range(MOST_CUTS):  # 1→4: the middle of a large triangle says little of what is near to it
+            long = np.linalg.norm(edge_vectors(corners), axis=2).max(axis=1) > fine
+            large = corners[long]
+            middle = 0.5 * (large + np.roll(large, -1, axis=1))
+            ends = [np.stack([large[:, k], middle[:, k], middle[:, k - 1]], axis=1) for k in range(3)]
+            corners = np.concatenate([corners[~long], *ends, middle])
         out, middle = area_vectors(corners), corners.mean(axis=1)
         middle -= np.floor(middle @ np.linalg.inv(T)) @ T
         every = (middle + (shifts @ T)[:, None]).reshape(-1, 3)
@@ -220,18 +226,6 @@ def _whole_sixths(surface: Surface) -> Floats:
     return np.asarray(np.round(found) * sixth)
 
 
-def _finer(corners: Floats, longest: float) -> Floats:
-    """(g,3,3) triangles (f,3,3) cut 1→4 until their sides are at most so long: the middle of a large one says
-    little of what is near to it."""
-    for _ in range(MOST_CUTS):
-        long = np.linalg.norm(edge_vectors(corners), axis=2).max(axis=1) > longest
-        large = corners[long]
-        middle = 0.5 * (large + np.roll(large, -1, axis=1))
-        ends = [np.stack([large[:, k], middle[:, k], middle[:, k - 1]], axis=1) for k in range(3)]
-        corners = np.concatenate([corners[~long], *ends, middle])
-    return corners
-
-
 def _left_over(surface: Surface, signs: Floats) -> Floats:
     """(e,) how often the patches of a room run along each edge one way more than the other."""
     topo = surface.topology
@@ -245,21 +239,25 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
     grounded = np.asarray(np.abs(surface.plane.height(surface.vertices)) <= ON * surface.size)
     edges = surface.topology.edges
     lying = np.asarray(grounded[edges].all(axis=1))
-    open_edges = np.flatnonzero((left != 0.0) & ~_closed_by_support(surface, edges, lying))
+    # what closes an edge: Π or another sliding plane, fixed ends, or one straight line
+    fixed = surface.fixed & ~members(surface.on_line, surface.n)
+    closed = fixed[edges].all(axis=1) | (lying & surface.held[edges].all(axis=1))
+    for line, along in surface.on_line:
+        if isinstance(line, Line):
+            on_it = along | (fixed & (line.distance(surface.vertices) <= ON * surface.size))
+            closed |= on_it[edges].all(axis=1)
+    for _, mask in surface.on_planes:
+        lying |= mask[edges].all(axis=1)
+        closed |= mask[edges].all(axis=1)
+    open_edges = np.flatnonzero((left != 0.0) & ~closed)
     if len(open_edges):
         ends = edges[open_edges[0]]
         place = point_text(surface.vertices[ends].mean(axis=0), surface.size)
-        raise SurfaceError(
-            f"room {room.name!r} does not close: its patches end along {len(open_edges)} edges that are"
-            f" neither held on a plane nor fixed down to Π, the first from vertex {ends[0]} to {ends[1]} near"
-            f" {place}; name the patches that are missing, with 1 where the normal points out of the room and"
-            " -1 where it points in, or hold that edge",
-            what="rooms",
-            where=room.name,
-            found=ends.tolist(),
-        )
-    for _, mask in surface.on_planes:
-        lying |= mask[edges].all(axis=1)
+        text = f"room {room.name!r} does not close: its patches end along {len(open_edges)} edges that are"
+        text += f" neither held on a plane nor fixed down to Π, the first from vertex {ends[0]} to {ends[1]}"
+        text += f" near {place}; name the patches that are missing, with 1 where the normal points out of the"
+        text += " room and -1 where it points in, or hold that edge"
+        raise SurfaceError(text, what="rooms", where=room.name, found=ends.tolist())
     off = np.flatnonzero((left != 0.0) & ~lying)
     if not len(off):
         return
@@ -277,29 +275,13 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
         tips = np.flatnonzero(net)  # where it comes down to Π: closed straight from tip to tip
         if not grounded[tips].all():
             place = surface.vertices[tips[~grounded[tips]][0]]
-            raise SurfaceError(
-                f"room {room.name!r} does not close: its fixed boundary ends at"
-                f" {point_text(place, surface.size)}, off Π; fix it down to Π, or choose Π (plane=)"
-                " through it",
-                what="rooms",
-                where=room.name,
-                found=place.tolist(),
+            text = f"room {room.name!r} does not close: its fixed boundary ends at"
+            text += (
+                f" {point_text(place, surface.size)}, off Π; fix it down to Π, or choose Π (plane=) through"
             )
+            raise SurfaceError(f"{text} it", what="rooms", where=room.name, found=place.tolist())
         if len(tips):
             yield float((net[tips] * _cones(middle, X[tips].mean(axis=0), X[tips])).sum())
-
-
-def _closed_by_support(surface: Surface, edges: Ints, lying: Bools) -> Bools:
-    """(e,) edges that something closes: on Π or another sliding plane, fixed, or along one straight line."""
-    fixed = surface.fixed & ~members(surface.on_line, surface.n)
-    closed = fixed[edges].all(axis=1) | (lying & surface.held[edges].all(axis=1))
-    for _, mask in surface.on_planes:
-        closed |= mask[edges].all(axis=1)
-    for line, along in surface.on_line:
-        if isinstance(line, Line):
-            on_it = along | (fixed & (line.distance(surface.vertices) <= ON * surface.size))
-            closed |= on_it[edges].all(axis=1)
-    return np.asarray(closed)
 
 
 def _cones(a: Floats, b: Floats, c: Floats) -> Floats:

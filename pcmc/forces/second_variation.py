@@ -17,22 +17,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints, read_only
+from ..base.arrays import Floats, Ints, Vector, read_only
 from ..base.compiled import compiled, inlined, sum_blocks
 from ..surface import Surface, expect_surface
-from ..surface.geometry import (
-    Vector,
-    accumulate,
-    add,
-    cross,
-    cross_sum,
-    dot,
-    norm,
-    point,
-    scaled,
-    sub,
-    vector,
-)
+from ..surface.geometry import accumulate, add, cross, cross_sum, dot, norm, point, scaled, sub, vector
 from .curved import add_element_products, fill_block
 from .elements import Elements, Mesh, add_hessian_products, energy_mesh
 from .functional import elements, energy_and_gradient
@@ -160,13 +148,7 @@ def _add_pair(
 
 @compiled
 def _assemble_triangles(
-    mesh: Mesh,
-    X: Floats,
-    space: MotionSpace,
-    pattern: Pattern,
-    hessian: float,
-    stiffness: float,
-    data: Floats,
+    mesh: Mesh, X: Floats, space: MotionSpace, pattern: Pattern, hessian: float, stiffness: float, out: Floats
 ) -> None:
     rows, n = mesh.rows, vector(mesh.normal)
     for f in range(len(rows)):
@@ -176,22 +158,16 @@ def _assemble_triangles(
             v, w, offset = rows[f, i], rows[f, j], pattern.offset[f, i]
             alone, pair, q = triangle_block(t, i, i), triangle_block(t, i, j), triangle_skew(t, k)
             if t.sixth_w == 0.0:
-                _add_diagonal(space, pattern, v, alone, None, data)
-                _add_pair(space, pattern, v, w, offset, pair, q, None, data)
+                _add_diagonal(space, pattern, v, alone, None, out)
+                _add_pair(space, pattern, v, w, offset, pair, q, None, out)
             else:
-                _add_diagonal(space, pattern, v, alone, triangle_tilt(t, n, i, i), data)
-                _add_pair(space, pattern, v, w, offset, pair, q, triangle_tilt(t, n, i, j), data)
+                _add_diagonal(space, pattern, v, alone, triangle_tilt(t, n, i, i), out)
+                _add_pair(space, pattern, v, w, offset, pair, q, triangle_tilt(t, n, i, j), out)
 
 
 @compiled
 def _assemble_curved(
-    mesh: Mesh,
-    X: Floats,
-    space: MotionSpace,
-    pattern: Pattern,
-    hessian: float,
-    stiffness: float,
-    data: Floats,
+    mesh: Mesh, X: Floats, space: MotionSpace, pattern: Pattern, hessian: float, stiffness: float, out: Floats
 ) -> None:
     size = mesh.faces.shape[1]
     block = np.empty((size, size, 3, 3))
@@ -201,9 +177,9 @@ def _assemble_curved(
             for j in range(i, size):
                 v, w = mesh.rows[e, i], mesh.rows[e, j]
                 if v <= w:
-                    _add_projected(block[i, j], v, w, space, pattern, data)
+                    _add_projected(block[i, j], v, w, space, pattern, out)
                 else:
-                    _add_projected(block[i, j].T, w, v, space, pattern, data)
+                    _add_projected(block[i, j].T, w, v, space, pattern, out)
 
 
 def add_blocks(

@@ -33,14 +33,15 @@ from ..surface.geometry import Vector, accumulate, add, cross, dot, norm, point,
 from .curved import measure_elements
 from .elements import Mesh, energy_mesh
 
-NO_GRADIENT = np.empty((0, 3))
-
 
 @compiled
 def measure_block(
     mesh: Mesh, X: Floats, first: int, last: int, area: Floats, volume: Floats, gradient: Floats
 ) -> None:
-    """Add the areas, volumes and ∇(αA - pV) of triangles first..last to (k,), (k,) and gradient (n,3)."""
+    """Add the areas, volumes and ∇(αA - pV) of triangles first..last to (k,), (k,) and gradient (n,3).
+
+    A gradient of no rows is left out.
+    """
     F, patch, origin = mesh.faces, mesh.patch, vector(mesh.origin)
     current = patch[first]
     alpha, sixth_p = mesh.tension[current], mesh.pressure[current] / 6.0
@@ -60,6 +61,8 @@ def measure_block(
         area_sum += 0.5 * twice_area
         b_cross_c = cross(b, c)
         volume_sum += dot(a, b_cross_c)
+        if len(gradient) == 0:
+            continue
         half_alpha_nu = scaled(0.5 * alpha / twice_area if twice_area > 0.0 else 0.0, normal)
         e_a = sub(minus_e_b, e_c)
         accumulate(gradient, i, sub(cross(half_alpha_nu, e_a), scaled(sixth_p, b_cross_c)))
@@ -69,31 +72,22 @@ def measure_block(
     volume[current] += volume_sum / 6.0
 
 
-@compiled
-def _measure_areas(mesh: Mesh, X: Floats, first: int, last: int, area: Floats, volume: Floats) -> None:
-    """The areas and volumes alone, for line searches that need no gradient."""
-    F, patch, origin = mesh.faces, mesh.patch, vector(mesh.origin)
-    for f in range(first, last):
-        i, j, k = F[f, 0], F[f, 1], F[f, 2]
-        a, b, c = sub(point(X, i), origin), sub(point(X, j), origin), sub(point(X, k), origin)
-        area[patch[f]] += 0.5 * norm(cross(sub(b, a), sub(c, a)))
-        volume[patch[f]] += dot(a, cross(b, c)) / 6.0
-
-
-def totals_and_gradient(mesh: Mesh, X: Floats, workers: int | None = None) -> tuple[Floats, Floats, Floats]:
+def totals_and_gradient(
+    mesh: Mesh, X: Floats, workers: int | None = None, sums_alone: bool = False
+) -> tuple[Floats, Floats, Floats]:
     """Areas (k,), volumes (k,) of the k patches and the gradient (n,3) of Σ αA - pV in one pass.
 
     Each block sums into arrays of its own, added in order: the same number of workers gives the
     same bytes, and a mesh under two BLOCKs the same bytes on every machine.
     """
     parts = len(blocks(len(mesh.faces), workers or threads()))
-    area, volume = np.zeros((2, parts, len(mesh.tension)))
-    gradient = [np.zeros(X.shape) for _ in range(parts)]
-    weightless, moment = mesh.weighing(), np.zeros_like(area)
+    area, volume, moment = np.zeros((3, parts, len(mesh.tension)))
+    gradient = [np.zeros((0, 3) if sums_alone else X.shape) for _ in range(parts)]
+    weightless = mesh.weighing()
 
     def work(part: int, first: int, last: int) -> None:
-        sums = area[part], volume[part], moment[part]
         if mesh.curved:
+            sums = area[part], volume[part], moment[part]
             measure_elements(weightless, X, first, last, *sums, gradient[part])
         else:
             measure_block(mesh, X, first, last, area[part], volume[part], gradient[part])
@@ -106,17 +100,7 @@ def totals_and_gradient(mesh: Mesh, X: Floats, workers: int | None = None) -> tu
 
 def areas_and_volumes(mesh: Mesh, X: Floats) -> tuple[Floats, Floats]:
     """Areas (k,) and signed volumes (k,), seen from the mesh's origin, of the k patches."""
-    parts = len(blocks(len(mesh.faces), threads()))
-    area, volume, moment = np.zeros((3, parts, len(mesh.tension)))
-
-    def work(part: int, first: int, last: int) -> None:
-        if mesh.curved:
-            measure_elements(mesh, X, first, last, area[part], volume[part], moment[part], NO_GRADIENT)
-        else:
-            _measure_areas(mesh, X, first, last, area[part], volume[part])
-
-    run_blocks(work, len(mesh.faces), None)
-    return area.sum(axis=0), volume.sum(axis=0)
+    return totals_and_gradient(mesh, X, sums_alone=True)[:2]
 
 
 def add_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
@@ -135,7 +119,7 @@ def add_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> 
 
 def moments(surface: Surface, X: Floats, weights: Floats, gradient: Floats | None = None) -> Floats:
     """(k,) ∫ z dA of each patch, length³; the gradient of Σ w ∫ z dA is added to ``gradient`` (n,3)."""
-    moment, out = np.zeros(len(surface.patches)), NO_GRADIENT if gradient is None else gradient
+    moment, out = np.zeros(len(surface.patches)), np.empty((0, 3)) if gradient is None else gradient
     mesh = energy_mesh(surface).weighing(weights)
     if mesh.curved:
         area, volume = np.zeros((2, len(moment)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -27,13 +27,11 @@ MAX_OFFSET = 4.0  # heights of the top edge that a wall vertex may be off the li
 class WallRows:
     """Wall vertices below the top edges of their walls.
 
-    With X_i, X_j the ends of a top edge, n the normal of Π and z the height over Π, the vertex is at
+    With X_i, X_j the ends of a top edge, P = (1 - λ) X_i + λ X_j, n the normal of Π and z the height over it,
 
-        P + z(P) ((ρ - 1) n + o),   P = (1 - λ) X_i + λ X_j
+        P + (ρ - 1) D + |D| o,   D = z(P) n
 
-    or, where the bottom of the wall is held, with Q the place between the held vertices below i and j,
-
-        P + (ρ - 1) (P - Q) + |P - Q| o
+    is the place of a vertex; where the bottom is held, D = P - Q, Q between the held vertices below i and j.
     """
 
     vertices: Ints  # (w,) their indices
@@ -52,29 +50,16 @@ class WallRows:
 
     def places(self, surface: Surface, X: Floats) -> Floats:
         """(w,3) where the rows lie, with the top edges at X (n,3)."""
-        top = self.top_places(X)
-        places = top + surface.plane.height(top)[:, None] * self.directions(surface)
-        held = self.feet[:, 0] >= 0
-        if held.any():
-            drop = self.drops(X)[held]
-            length = np.linalg.norm(drop, axis=1)[:, None]
-            shift = (self.relative_height[held, None] - 1.0) * drop + length * self.offset[held]
-            places[held] = top[held] + shift
-        return places
+        drop = self.drops(surface, X)
+        aside = np.linalg.norm(drop, axis=1)[:, None] * self.offset
+        return np.asarray(self.top_places(X) + (self.relative_height[:, None] - 1.0) * drop + aside)
 
-    def heights(self, surface: Surface, X: Floats) -> Floats:
-        """(w,) the height of the top edge over the bottom at each row, length."""
-        drop = np.linalg.norm(self.drops(X), axis=1)
-        return np.where(self.feet[:, 0] >= 0, drop, np.abs(surface.plane.height(self.top_places(X))))
-
-    def drops(self, X: Floats) -> Floats:
-        """(w,3) P - Q, from the held bottom up to the top edge; without meaning where the bottom slides."""
-        return self.top_places(X) - self._between(X[self.feet[:, 0]], X[self.feet[:, 1]])
-
-    def directions(self, surface: Surface) -> Floats:
-        """(w,3) from the place on the top edge to the vertex, over the height there: (ρ - 1) n + o."""
-        normal = np.array(surface.plane.normal)
-        return (self.relative_height[:, None] - 1.0) * normal + self.offset
+    def drops(self, surface: Surface, X: Floats) -> Floats:
+        """(w,3) D, from the bottom up to the top edge."""
+        top, held = self.top_places(X), self.feet[:, 0] >= 0
+        drop = surface.plane.height(top)[:, None] * np.array(surface.plane.normal)
+        drop[held] = (top - self._between(X[self.feet[:, 0]], X[self.feet[:, 1]]))[held]
+        return np.asarray(drop)
 
 
 def wall_rows(
@@ -90,14 +75,10 @@ def wall_rows(
     """
     vertices = distinct(wall_edges, surface.n)
     vertices = vertices[~roof_vertex[vertices]]
-    X, height = surface.vertices, surface.plane.height(surface.vertices)
-    zero, none = np.zeros(len(vertices)), np.zeros((len(vertices), 3))
+    X, zero, none = surface.vertices, np.zeros(len(vertices)), np.zeros((len(vertices), 3))
     if foot is None:
-        flat = X - height[:, None] * np.array(surface.plane.normal)
-        ends, fraction = _nearest(flat, vertices, top_edges)
+        ends, fraction = _nearest(surface.plane.nearest(X), vertices, top_edges)
         feet, bottom = np.full_like(ends, -1), surface.on_ground
-        top = (1.0 - fraction) * height[ends[:, 0]] + fraction * height[ends[:, 1]]
-        share, whole = height[vertices], top
     else:
         edge, tops = np.empty(surface.n, dtype=np.int64), np.flatnonzero(foot >= 0)
         edge[top_edges.ravel()] = np.repeat(np.arange(len(top_edges)), 2)
@@ -107,31 +88,30 @@ def wall_rows(
         ends = top_edges[edge[above]]
         fraction = (ends[:, 1] == above).astype(float)
         feet, bottom = foot[ends], surface.pinned
-        rows = WallRows(vertices, ends, fraction, zero, none, feet)
-        drop = rows.drops(X)
-        top = np.linalg.norm(drop, axis=1)
-        share = np.einsum("ij,ij->i", X[vertices] - rows.top_places(X) + drop, drop)
-        whole = top**2
-    stands = np.abs(top) > ON * surface.size
-    relative = np.clip(np.divide(share, whole, out=zero, where=stands), 0.0, 1.0)
-    if not stands.all():
-        relative = np.where(stands, relative, _heights_by_steps(surface, vertices, wall_edges, bottom))
+    rows = WallRows(vertices, ends, fraction, zero, none, feet)
+    drop = rows.drops(surface, X)
+    top = np.linalg.norm(drop, axis=1)
+    share, stands = (
+        np.einsum("ij,ij->i", X[vertices] - rows.places(surface, X), drop),
+        top > ON * surface.size,
+    )
+    relative = np.clip(np.divide(share, top**2, out=zero.copy(), where=stands), 0.0, 1.0)
+    if not stands.all():  # steps to the foot, over those to the foot and to the top
+        inner = np.zeros(surface.n, dtype=bool)
+        inner[vertices] = True
+        tops = np.unique(wall_edges[~(inner | surface.pinned)[wall_edges]])
+        # a corner is foot and top at once: no path may lead through it
+        links = wall_edges[(inner | np.isin(np.arange(surface.n), tops))[wall_edges].all(axis=1)]
+        goals = vertices[bottom[vertices]], tops
+        down, up = (_steps(links, goal, surface.n, nearest=True)[vertices] for goal in goals)
+        reached = np.isfinite(down + up)
+        steps = np.where(reached, down / np.where(reached, down + up, 1.0), 0.5)
+        relative = np.where(stands, relative, steps)
     relative[bottom[vertices]] = 0.0
-    straight = WallRows(vertices, ends, fraction, relative, none, feet).places(surface, X)
-    offset = np.divide(X[vertices] - straight, top[:, None], out=none, where=stands[:, None])
+    rows = replace(rows, relative_height=relative)
+    offset = np.divide(X[vertices] - rows.places(surface, X), top[:, None], out=none, where=stands[:, None])
     offset[np.linalg.norm(offset, axis=1) > MAX_OFFSET] = 0.0
-    return WallRows(vertices, ends, fraction, relative, offset, feet)
-
-
-def join_rows(parts: list[WallRows]) -> WallRows:
-    """The rows of several walls as one; a vertex that two walls share belongs to the first."""
-    if not parts:
-        none = np.empty(0, dtype=int)
-        pairs = np.empty((0, 2), dtype=int)
-        return WallRows(none, pairs, np.empty(0), np.empty(0), np.empty((0, 3)), pairs)
-    columns = [np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(WallRows)]
-    first = np.unique(columns[0], return_index=True)[1]
-    return WallRows(*(values[first] for values in columns))
+    return replace(rows, offset=offset)
 
 
 def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Floats]:
@@ -148,20 +128,6 @@ def _nearest(flat: Floats, vertices: Ints, top_edges: Ints) -> tuple[Ints, Float
     fraction = fraction[row, best]
     fraction = np.where(fraction < SNAP, 0.0, np.where(fraction > 1.0 - SNAP, 1.0, fraction))
     return top_edges[near[row, best]], fraction
-
-
-def _heights_by_steps(surface: Surface, vertices: Ints, wall_edges: Ints, bottom: Bools) -> Floats:
-    """ρ (w,) by edges (k,2) of the wall: steps to the foot, over those to the foot and to the top."""
-    inner = np.zeros(surface.n, dtype=bool)
-    inner[vertices] = True
-    top = np.unique(wall_edges[~(inner | surface.pinned)[wall_edges]])
-    foot = vertices[bottom[vertices]]
-    # a corner is foot and top at once: no path may lead through it
-    links = wall_edges[(inner | np.isin(np.arange(surface.n), top))[wall_edges].all(axis=1)]
-    steps = [_steps(links, goals, surface.n, nearest=True)[vertices] for goals in (foot, top)]
-    reached = np.isfinite(steps[0]) & np.isfinite(steps[1])
-    total = np.where(reached, steps[0] + steps[1], 1.0)
-    return np.where(reached, steps[0] / total, 0.5)
 
 
 def _steps(edges: Ints, goals: Ints, n: int, nearest: bool = False) -> Floats:
@@ -332,7 +298,10 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
             every.append((index, edges, top, feet))
     if every:
         expect_no_images(surface, "a wall that slides on the plane, or comes down to its held bottom")
-    rows = join_rows([wall_rows(surface, roof_vertex, top, edges, feet) for _, edges, top, feet in every])
+    parts = [WallRows(none[:, 0], none, np.empty(0), np.empty(0), np.empty((0, 3)), none)]
+    parts += [wall_rows(surface, roof_vertex, top, edges, feet) for _, edges, top, feet in every]
+    columns = [np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(WallRows)]
+    first = np.unique(columns[0], return_index=True)[1]  # what two walls share belongs to the first
     top_edges = np.concatenate([none, *(top for _, _, top, _ in every)])
     below = np.concatenate([none[:, 0], *(np.full(len(top), index) for index, _, top, _ in every)])
     on_top, pinchable = np.zeros(n, dtype=bool), np.zeros(len(surface.patches), dtype=bool)
@@ -343,7 +312,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     force = (surface.net_pressures * ~surface.auxiliary)[patch] / 3.0
     push = vertex_sums((force * (area_vectors(X[F]) @ np.array(surface.plane.normal)))[:, None], F, n)[:, 0]
     return Walls(
-        rows=rows,
+        rows=WallRows(*(values[first] for values in columns)),
         top_edges=top_edges,
         wall_below=below,
         top_free=on_top & ~surface.pinned & ~surface.on_ground,

@@ -4,8 +4,8 @@ A patch's tension is its faces' ``tension``; the patches of one pressure p ≠ 0
 ``pressure p``; fixed vertices are ``fixed``, sliding ones lie on ``constraint 1``, the plane Π, and on
 ``constraint 2`` and so on, the other planes. A cable is a line ``tension`` of its edges. A weight w is one
 quantity ``self_weight_k``: the integral of w z. Evolver measures volumes from the origin (det/6 per face,
-Eq. 10b), so coordinates are relative to the point of Π, or with other planes to ``Surface.origin``. A plane
-that does not pass there has the ``content`` of its flat pieces, as an integral along its edges:
+Eq. 10b), so coordinates are relative to ``Surface.origin``. A plane that does not pass there has the
+``content`` of its flat pieces, as an integral along its edges:
 ∫ ⟨-c × x / 6, dx⟩ = -⟨c, a × b⟩ / 6; the ends of these pieces are a quantity ``corner_k`` of their vertex.
 Then ``total_energy`` is E of Eq. (20). A room of prescribed volume is a body with that ``volume``; its
 Lagrange multiplier is the pressure, ``volconst`` the part of the volume that the cones do not see.
@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints, format_rows
+from ..base.arrays import Ints, format_rows
 from ..base.errors import FileError
-from ..forces.flat_pieces import add_plane_volumes, flat_pieces
-from ..forces.rooms import room_pressures, room_volumes
+from ..forces.flat_pieces import flat_pieces
+from ..forces.rooms import closing_volumes, room_pressures
 from ..meshing.refinement import edges_on_planes
 from ..surface import Surface
 from .evolver_reading import ROUNDING, read
@@ -55,43 +55,37 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         snow = f" snow {p.snow!r}" if p.snow else ""
         weight = f" weight {p.weight!r} self_weight_{1 + weights.index(p.weight)}" if p.weight else ""
         face_tags.append(f" tension {p.tension!r} patch {k}{snow}{weight}")
-    origin = surface.origin if surface.on_planes else np.array(surface.plane.point)
     named = [("patch", k, p.name) for k, p in patches]
     named += [("bare", k, p.name) for k, p in patches if p.name in content.bare]
     named += [("wall", k, "") for k, p in patches if p.wall]
     named += [("room", k, room.name) for k, room in enumerate(surface.rooms, 1)]
     named += [("cable", k, cable.name) for k, cable in enumerate(surface.cables, 1)]
-    header = HEADER.format(
-        mark=content.mark and f"\n// {content.mark}",
-        origin=" ".join(map(repr, origin.tolist())),
-        names="\n".join(f"// {kind} {k} {escaped(name, SPECIAL)}".rstrip() for kind, k, name in named),
-    )
+    names = "\n".join(f"// {kind} {k} {escaped(name, SPECIAL)}".rstrip() for kind, k, name in named)
+    mark, origin = content.mark and f"\n// {content.mark}", " ".join(map(repr, surface.origin.tolist()))
     topo = surface.topology
     sides = ((topo.edge_of_face + 1) * topo.sense)[:, [2, 0, 1]]
     vertex_tag, edge_tag = _tags(surface)
     sections = {
-        "VERTICES": ("%r %r %r", surface.vertices - origin, vertex_tag),
+        "VERTICES": ("%r %r %r", surface.vertices - surface.origin, vertex_tag),
         "EDGES": ("%d %d", topo.edges + 1, edge_tag),
         "FACES": ("%d %d %d", sides, np.array(face_tags)[surface.patch_of_face]),
     }
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(header + _constraints(surface, origin) + _attributes(surface, origin, weights))
+        file.write(HEADER.format(mark=mark, origin=origin, names=names) + _definitions(surface, weights))
         for name, (template, rows, tag) in sections.items():
-            file.write(f"\n{name}\n" + format_rows(f"%d {template}%s\n", _count(rows), *rows.T, tag))
+            numbers = np.arange(1, len(rows) + 1)
+            file.write(f"\n{name}\n" + format_rows(f"%d {template}%s\n", numbers, *rows.T, tag))
         file.write("\nBODIES\n" + _bodies(surface) + "\nREAD\n")
-
-
-def _count(rows: Any) -> Ints:
-    return np.arange(1, len(rows) + 1)
 
 
 def _linear(coefficients: Sequence[float]) -> str:
     return " + ".join(f"({c!r})*{axis}" for c, axis in zip(coefficients, "xyz", strict=True))
 
 
-def _constraints(surface: Surface, origin: Floats) -> str:
-    """Π and the other planes as constraints 1, 2, …, the latter with the content of their flat pieces."""
-    pieces, text = flat_pieces(surface), ""
+def _definitions(surface: Surface, weights: Sequence[float]) -> str:
+    """Π and the other planes as constraints 1, 2, …, the latter with the content of their flat pieces; the
+    attributes of edges and faces; a quantity for each weight."""
+    origin, pieces, text = surface.origin, flat_pieces(surface), ""
     tail = surface.faces[pieces.face, pieces.corner]
     head = surface.faces[pieces.face, (pieces.corner + 1) % 3]
     for number, (plane, mask) in enumerate(((surface.plane, surface.on_plane), *surface.on_planes), 1):
@@ -110,12 +104,7 @@ def _constraints(surface: Surface, origin: Floats) -> str:
     for k, (patch, normal) in enumerate(zip(pieces.end_patch, pieces.normal, strict=True)):
         pull = _linear((-surface.net_pressures[patch] * normal).tolist())
         text += f"QUANTITY corner_{k} ENERGY METHOD VERTEX_SCALAR_INTEGRAL\nSCALAR_INTEGRAND: {pull}\n"
-    return text
-
-
-def _attributes(surface: Surface, origin: Floats, weights: Sequence[float]) -> str:
-    """The attributes of edges and faces, and a quantity for each weight, coordinates from ``origin`` (3,)."""
-    text = "DEFINE EDGE ATTRIBUTE cable INTEGER\n" if surface.cables else ""
+    text += "DEFINE EDGE ATTRIBUTE cable INTEGER\n" if surface.cables else ""
     text += "DEFINE FACET ATTRIBUTE snow REAL\n" if surface.snows.any() else ""
     text += "DEFINE FACET ATTRIBUTE weight REAL\n" if weights else ""
     height = f"{_linear(surface.plane.normal)} + ({float(surface.plane.height(origin))!r})"
@@ -137,8 +126,7 @@ def _tags(surface: Surface) -> tuple[Any, Any]:
     for kind, masks in ((support, at_vertices), (of_edge, at_edges)):
         tag = kinds[kind]
         for number, mask in enumerate(masks, 2):
-            first = np.strings.find(tag, "constraint") < 0
-            more = np.where(first, f" constraint {number}", f" {number}")
+            more = np.where(np.strings.find(tag, "constraint") < 0, f" constraint {number}", f" {number}")
             tag = np.strings.add(tag, np.where(mask, more, ""))
         tags.append(tag.astype(object))
     vertices, edges = tags
@@ -153,7 +141,7 @@ def _bodies(surface: Surface) -> str:
     """A body for each room, and one for each net pressure, on the side of a face where no room is."""
     pressures, signs = surface.net_pressures, surface.room_signs
     side = np.where((signs > 0.0).any(axis=0), -1, 1)[surface.patch_of_face]
-    bodies: list[tuple[Ints, str]] = []
+    numbers, bodies = np.arange(1, surface.m + 1), list[tuple[Ints, str]]()
     if surface.rooms:
         multipliers = room_pressures(surface)
         left = surface.pressures - multipliers @ signs
@@ -166,25 +154,16 @@ def _bodies(surface: Surface) -> str:
             text += " datafile has one body on each side of a face; give all patches of its rooms its load"
             raise FileError(text, where=name, found=float(left[both[0]]))
         pressures = left  # as of snow, beside those of the rooms
-        beyond = room_volumes(surface) - signs @ _cones(surface)
+        beyond = closing_volumes(surface).tolist()
         for k, room in enumerate(surface.rooms):
-            members = signs[k, surface.patch_of_face].astype(int) * _count(surface.faces)
-            rest = f" volume {room.volume!r} volconst {float(beyond[k])!r}"
+            members = signs[k, surface.patch_of_face].astype(int) * numbers
+            rest = f" volume {room.volume!r} volconst {beyond[k]!r}"
             bodies.append((members[members != 0], f"{rest} lagrange_multiplier {float(multipliers[k])!r}"))
     of_face = side * pressures[surface.patch_of_face]
     for pressure in np.unique(of_face[of_face != 0.0]).tolist():
-        bodies.append(((side * _count(surface.faces))[of_face == pressure], f" pressure {pressure!r}"))
+        bodies.append(((side * numbers)[of_face == pressure], f" pressure {pressure!r}"))
     text = ""
     for number, (members, rest) in enumerate(bodies, 1):
-        words = members.astype(str)
-        lines = [" ".join(words[k : k + 15]) for k in range(0, len(words), 15)]
+        lines = [" ".join(members[k : k + 15].astype(str)) for k in range(0, len(members), 15)]
         text += f"{number} " + " \\\n  ".join(lines) + f"{rest}\n"
     return text
-
-
-def _cones(surface: Surface) -> Floats:
-    """(k,) the volumes of the patches' cones seen from the point of Π, as the program sees them."""
-    corners = surface.vertices[surface.faces] - np.array(surface.plane.point)
-    volumes = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    of_patch = np.bincount(surface.patch_of_face, volumes, len(surface.patches)).astype(float)
-    return add_plane_volumes(surface, surface.vertices, of_patch)

@@ -24,6 +24,7 @@ from .polygons import cut_polygons
 from .text import TextSection, constant, kinds_of, line_ends, linear_expression
 
 WRITTEN = "written by pcmc"
+NUMBERED = r"(\d+)((?:[^\S\n]+-?\d+){})([^\n]*)"  # an element, the numbers of its parts, and the rest
 ROUNDING = 1e-12  # of the largest pressure: what is left of differences
 UNREADABLE = (
     "string|quadratic|lagrange|simplex_representation|torus|torus_filled|symmetry_group|#include|#define"
@@ -51,20 +52,11 @@ def read(path: Path) -> MeshData:
         of_patch[patch_of_face] = sides
         signs = tuple((patches[k].name, int(of_patch[k])) for k in np.flatnonzero(of_patch))
         rooms.append(Room(names.get(number, f"body {number}"), signs, volume))
-    unset = file.names("bare").values()
-    return MeshData(
-        X + origin,
-        F,
-        patch_of_face[source],
-        patches,
-        support,
-        plane,
-        notes=(*notes, *more),
-        planes=planes,
-        rooms=tuple(rooms),
-        cables=_cables(file.names("cable"), edges, ends, edge_rest),
-        bare=tuple(p.name for p in patches if p.name in unset and p.tension == p.pressure == 1.0),
-    )
+    unset, cables = file.names("bare").values(), _cables(file.names("cable"), edges, ends, edge_rest)
+    bare = tuple(p.name for p in patches if p.name in unset and p.tension == p.pressure == 1.0)
+    about: dict[str, Any] = {"planes": planes, "rooms": tuple(rooms), "cables": cables, "bare": bare}
+    mesh = X + origin, F, patch_of_face[source], patches, support, plane
+    return MeshData(*mesh, notes=(*notes, *more), **about)
 
 
 class _Datafile(dict[str, TextSection]):
@@ -75,11 +67,9 @@ class _Datafile(dict[str, TextSection]):
         bare = re.sub(r"//[^\n]*", "", bare)
         bare = re.sub(r"\\[^\S\n]*\n", "\f", bare)
         heads = list(re.finditer(r"^[^\S\n]*(vertices|edges|faces|facets|bodies|read)\b", bare, re.I | re.M))
-        starts = [0, *(h.end() for h in heads)]
-        ends = [*(h.start() for h in heads), len(bare)]
-        names = ["top", *(h[1].lower().replace("facets", "faces") for h in heads)]
+        named = [("top", 0), *((h[1].lower().replace("facets", "faces"), h.end()) for h in heads)]
         known = {"pi": math.pi}
-        for name, start, end in zip(names, starts, ends, strict=True):
+        for (name, start), end in zip(named, [*(h.start() for h in heads), len(bare)], strict=True):
             self.setdefault(name, TextSection(bare[start:end], 1 + line_ends(bare[:start]), known))
             if name == "read":
                 break  # what follows are commands
@@ -99,9 +89,8 @@ class _Datafile(dict[str, TextSection]):
     def names(self, kind: str) -> dict[str, str]:
         """The names that comments give to patches, rooms or cables, by number."""
         rows = re.findall(rf"^// {kind} (\d+) ([^\n]+)$", self.header, re.M)
-        names = names_from_file(name for _, name in rows)[0]
-        shown = unquote if WRITTEN in self.header else str
-        return {number: shown(names[name]) for number, name in rows}
+        names, ours = names_from_file(name for _, name in rows)[0], WRITTEN in self.header
+        return {number: unquote(names[name]) if ours else names[name] for number, name in rows}
 
 
 def _vertices(section: TextSection) -> tuple[Ints, Floats, Ints, dict[int, Bools]]:
@@ -127,8 +116,7 @@ def _vertices(section: TextSection) -> tuple[Ints, Floats, Ints, dict[int, Bools
 
 def _faces(section: TextSection, edge_ids: Ints, ends: Ints) -> tuple[Ints, Ints, Ints, Sequence[str]]:
     """Ids, vertices of face after face, corners of each face, and what follows the edges on its line."""
-    pattern, what = r"(\d+)((?:[^\S\n]+-?\d+)+)([^\n]*)", "a face number and its edges"
-    numbers, edges, rest = section.columns(pattern, what)
+    numbers, edges, rest = section.columns(NUMBERED.format("+"), "a face number and its edges")
     counts = np.array([len(listed.split()) for listed in edges], dtype=np.int64)
     row = np.repeat(np.arange(len(counts)), counts)
     signed = section.integers(" ".join(edges).split(), row)
@@ -169,8 +157,7 @@ def _pressures(
     if "bodies" not in file:
         return pressure, prescribed, ("the file has no bodies, so no patch is under pressure",)
     section = file["bodies"]
-    pattern = r"(\d+)((?:[^\S\n]+-?\d+)*)([^\n]*)"
-    bodies, faces, rest = section.columns(pattern, "a body number and its faces")
+    bodies, faces, rest = section.columns(NUMBERED.format("*"), "a body number and its faces")
     inside, given = section.values(rest, "pressure|lagrange_multiplier", 1.0)
     volume, limited = section.values(rest, "volume")
     of_body = np.repeat(np.arange(len(bodies)), [len(members.split()) for members in faces])
@@ -227,8 +214,8 @@ def _planes(
     for number in sorted({*used, *described} & set(constraints) - {first}):
         kind, name = described.get(number, ("support", ""))
         plane: Any = _plane(file["top"], number, origin, needed=True)
-        about = {"name": unquote(name.strip()), "mirror": kind == "mirror"}
-        others.append((replace(plane, **about), constraints[number]))
+        plane = replace(plane, name=unquote(name.strip()), mirror=kind == "mirror")
+        others.append((plane, constraints[number]))
     return ground, tuple(others), origin
 
 
@@ -236,10 +223,10 @@ def _plane(top: TextSection, number: int, origin: Floats, needed: bool) -> Plane
     """The plane of this constraint; None if it is not needed and not there."""
     pattern = rf"^[^\S\n]*constraint\s+{number}\b[^\n]*\s+(?:formula|function)\s*:?\s*([^\n]+)"
     hit = re.search(pattern, top.text, re.I | re.M)
-    if hit is None and not needed:
-        return None
     if hit is None:
-        raise top.error(f"constraint {number} has no formula here")
+        if needed:
+            raise top.error(f"constraint {number} has no formula here")
+        return None
     left, _, right = hit[1].partition("=")
 
     def fail(problem: str) -> FileError:

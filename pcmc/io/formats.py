@@ -28,7 +28,7 @@ class Format:
     separate: bool = False  # whether it has a mesh per patch, which cannot have triangles without area
     own: tuple[str, ...] = ()  # the parts that it holds in its own way; others are among the metadata
     bare: bool = False  # whether it holds nothing but triangles and names
-    loses: tuple[str, ...] = ()  # the ``PARTS`` that it does not hold
+    loses: tuple[str, ...] = ("order", "images")  # the ``PARTS`` that it does not hold
     reads: bool = True  # whether pcmc reads it, too
     members: bool = False  # whether it holds the members and cables' sections of a structural model
     unit: str = ""  # of length, that the format prescribes; empty if a file may have any, or says none
@@ -95,22 +95,18 @@ PARTS = {
 }
 TOLD = tuple(name for name, part in PARTS.items() if part.words)
 OURS = ("support", "patch")
+EVOLVER = Format("evolver", shared=True, loses=("lines", "cable weights", "order", "images", "unit"))
 FORMATS = {
-    ".pcmc": Format("native", scalars="both", certificate=True, shared=True),
-    ".fe": Format("evolver", shared=True, loses=("lines", "cable weights", "order", "images", "unit")),
-    ".dmp": Format("evolver", shared=True, loses=("lines", "cable weights", "order", "images", "unit")),
-    ".obj": Format("obj", loses=("order", "images")),
-    ".ply": Format(
-        "ply", scalars="both", reserved=(*"xyz", *OURS, "vertex_indices"), loses=("order", "images")
-    ),
+    ".pcmc": Format("native", "both", certificate=True, shared=True, loses=()),
+    **dict.fromkeys((".fe", ".dmp"), EVOLVER),
+    ".obj": Format("obj"),
+    ".ply": Format("ply", "both", reserved=(*"xyz", *OURS, "vertex_indices")),
     ".stl": Format("stl", separate=True, bare=True, loses=TOLD),
-    ".vtp": Format("vtk", scalars="both", reserved=OURS, loses=("images",)),
-    ".vtu": Format("vtk", scalars="both", reserved=OURS, loses=("images",)),
-    ".glb": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order", "images")),
-    ".gltf": Format("gltf", "vertices", colours=True, separate=True, unit="m", loses=("order", "images")),
-    ".usda": Format("usd", "vertices", colours=True, separate=True, reads=False, loses=("order", "images")),
-    ".3dm": Format("rhino", separate=True, members=True, own=("cables",), loses=("order", "images")),
-    ".ifc": Format("ifc", certificate=True, separate=True, members=True, loses=("order", "images")),
+    **dict.fromkeys((".vtp", ".vtu"), Format("vtk", "both", reserved=OURS, loses=("images",))),
+    **dict.fromkeys((".glb", ".gltf"), Format("gltf", "vertices", colours=True, separate=True, unit="m")),
+    ".usda": Format("usd", "vertices", colours=True, separate=True, reads=False),
+    ".3dm": Format("rhino", separate=True, members=True, own=("cables",)),
+    ".ifc": Format("ifc", certificate=True, separate=True, members=True),
 }
 """The formats by suffix."""
 METRES = (".glb", ".gltf", ".3dm", ".ifc", ".usda")

@@ -36,12 +36,10 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     for name, values in content.scalars.items():
         finite = np.isfinite(values) & (np.abs(values) < -NO_VALUE)
         data["_" + re.sub(r"\W+", "_", name)] = np.where(finite, values, NO_VALUE).astype(np.float32)
-    turned = surface.vertices[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
-    place = np.eye(4)
+    turned, place = surface.vertices[:, [0, 2, 1]] * [1.0, 1.0, -1.0], np.eye(4)
     place[:3, 3] = file_origin(turned, surface.size)
-    turned = turned - place[:3, 3]
-    scene = trimesh.Scene()
-    shades = None
+    turned -= place[:3, 3]
+    scene, shades = trimesh.Scene(), None
     if content.colour:
         shades, least, most = scalar_colors(content.scalars[content.colour])
         scene.metadata["pcmc colours"] = {"scalar": content.colour, "least": least, "most": most}
@@ -62,11 +60,11 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         scene.metadata["pcmc mark"] = content.mark
     if content.walls is not None:
         scene.metadata[WALLS] = content.walls
-    library = trimesh.exchange.gltf
+    library, options = trimesh.exchange.gltf, {"include_normals": True}
     if path.suffix.lower() == ".glb":
-        path.write_bytes(library.export_glb(scene, include_normals=True))
+        path.write_bytes(library.export_glb(scene, **options))
     else:
-        path.write_bytes(library.export_gltf(scene, embed_buffers=True, include_normals=True)["model.gltf"])
+        path.write_bytes(library.export_gltf(scene, embed_buffers=True, **options)["model.gltf"])
 
 
 def read(path: Path) -> MeshData:
@@ -96,7 +94,6 @@ def read(path: Path) -> MeshData:
             raise FileError(text, where=str(error)) from None
     mesh = from_scene(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
     X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
-    named = {k[1:]: v for k, v in mesh.scalars.items() if k.startswith("_")}
-    held = support_kinds(named.pop(SUPPORT[1:])) if SUPPORT in mesh.scalars else None
-    scalars = {k: np.where(v == NO_VALUE, np.nan, v) for k, v in named.items()}
+    scalars = {k[1:]: np.where(v == NO_VALUE, np.nan, v) for k, v in mesh.scalars.items() if k[0] == "_"}
+    held = support_kinds(scalars.pop(SUPPORT[1:])) if SUPPORT in mesh.scalars else None
     return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(WALLS))

@@ -46,8 +46,8 @@ FINDINGS = {  # in the property set of the certificate, by the name there
     "LoadRatio": ("IfcReal", "load_ratio"),
     "LowestEigenvalue": ("IfcReal", "lowest_eigenvalue"),
 }
-TYPES: dict[str, Callable[[Any], Any]] = dict.fromkeys(("IfcText", "IfcLabel"), str)
-TYPES |= {"IfcInteger": int, "IfcReal": float}
+TYPES = {"IfcText": str, "IfcLabel": str, "IfcInteger": int, "IfcReal": float}
+Properties = Mapping[str, tuple[str, Any]]  # by name, the type and value
 
 
 def write(path: Path, surface: Surface, content: Content) -> None:
@@ -103,26 +103,23 @@ class _Model:
         return self.add("IfcAxis2Placement3D", Location=origin)
 
     def placement(self, relative: Any = None, point: Iterable[float] = (0.0, 0.0, 0.0)) -> Any:
-        axes = self.axes(point)
-        return self.add("IfcLocalPlacement", PlacementRelTo=relative, RelativePlacement=axes)
+        return self.add("IfcLocalPlacement", PlacementRelTo=relative, RelativePlacement=self.axes(point))
+
+    def of_force(self, measure: str) -> str:
+        """The type of a number with a unit of force; without such a unit it is a bare number."""
+        return measure if self.units.force else "IfcReal"
 
     def aggregate(self, role: str, whole: Any, parts: list[Any]) -> None:
         self.rooted("IfcRelAggregates", role, RelatingObject=whole, RelatedObjects=parts)
 
     def add_roof(self) -> Any:
-        context = self.add(
-            "IfcGeometricRepresentationContext",
-            ContextType="Model",
-            CoordinateSpaceDimension=3,
-            Precision=1e-9 * self.surface.size,
-            WorldCoordinateSystem=self.axes(),
-        )
-        about = {"ContextType": "Model", "ParentContext": context}
-        kind = "IfcGeometricRepresentationSubContext"
+        kind, about = "IfcGeometricRepresentation", dict[str, Any](ContextType="Model")
+        frame = {"Precision": 1e-9 * self.surface.size, "WorldCoordinateSystem": self.axes()}
+        context = self.add(f"{kind}Context", CoordinateSpaceDimension=3, **frame, **about)
+        kind, about = f"{kind}SubContext", {"ParentContext": context, **about}
         self.body = self.add(kind, ContextIdentifier="Body", TargetView="MODEL_VIEW", **about)
         self.axis = self.add(kind, ContextIdentifier="Axis", TargetView="GRAPH_VIEW", **about)
-        units = assigned_units(self.add, self.units)
-        about = {"RepresentationContexts": [context], "UnitsInContext": units}
+        about = {"RepresentationContexts": [context], "UnitsInContext": assigned_units(self.add, self.units)}
         whole, place = self.rooted("IfcProject", "project", Name="Roof", **about), None
         for kind in ("Site", "Building", "BuildingStorey"):
             place = self.placement(place)
@@ -141,11 +138,8 @@ class _Model:
         """The element of patch k, with its vertices and triangles as in ``patch_meshes``."""
         surface, patch = self.surface, self.surface.patches[k]
         points = (surface.vertices[used] - self.middle).tolist()
-        mesh = self.add(
-            "IfcTriangulatedFaceSet",
-            Coordinates=self.add("IfcCartesianPointList3D", CoordList=points),
-            CoordIndex=(faces + 1).tolist(),
-        )
+        places = self.add("IfcCartesianPointList3D", CoordList=points)
+        mesh = self.add("IfcTriangulatedFaceSet", Coordinates=places, CoordIndex=(faces + 1).tolist())
         rgb = self.add("IfcColourRgb", None, *color.tolist())
         shading = self.add("IfcSurfaceStyleShading", SurfaceColour=rgb, Transparency=0.0)
         style = self.add("IfcSurfaceStyle", Name=patch.name, Side="BOTH", Styles=[shading])
@@ -155,11 +149,9 @@ class _Model:
         if patch.name in self.replaced:
             kind, about = "IfcVirtualElement", {}
         element = self.element(kind, f"patch {k}", patch.name, place, shape, **about)
-        per_length, per_area = "IfcLinearForceMeasure", "IfcPlanarForceMeasure"
-        if not self.units.force:
-            per_length = per_area = "IfcReal"
+        per_area = self.of_force("IfcPlanarForceMeasure")
         values = {
-            "Tension": (per_length, patch.tension),
+            "Tension": (self.of_force("IfcLinearForceMeasure"), patch.tension),
             "Pressure": (per_area, patch.pressure),
             "Weight": (per_area, patch.weight),
             "Snow": (per_area, patch.snow),
@@ -173,7 +165,7 @@ class _Model:
 
     def add_cable(self, cable: Cable, place: Any) -> Any:
         """The tendon of a cable: its axis as polylines, and its force."""
-        chains = self.surface.topology.chains(cable.edges, np.zeros(self.surface.n, dtype=bool))
+        chains = self.surface.topology.chains(cable.edges)
         lines = [self.polyline(self.surface.vertices[c.vertices], c.closed) for c in chains]
         pull = float(pull_along(self.surface, cable, np.unique(cable.edges)).max())  # a weight lets it vary
         about = {"TensionForce": pull if self.units.force else None, "PredefinedType": "NOTDEFINED"}
@@ -181,8 +173,8 @@ class _Model:
             about["CrossSectionArea"] = self.cable_areas[cable.name] * self.square_metres
         shape = self.axis, "Curve3D", lines
         tendon = self.element("IfcTendon", f"cable {cable.name}", cable.name, place, shape, **about)
-        force = ("IfcForceMeasure" if self.units.force else "IfcReal", pull)
-        self.add_properties("Pcmc_Cable", tendon, {"Force": force}, cable.name)
+        force = {"Force": (self.of_force("IfcForceMeasure"), pull)}
+        self.add_properties("Pcmc_Cable", tendon, force, cable.name)
         return tendon
 
     def add_member(self, line: Any, place: Any) -> Any:
@@ -206,11 +198,10 @@ class _Model:
         kind = {"column": "IfcColumn", "stay": "IfcTendon", "cable": "IfcTendon"}.get(line.kind, "IfcBeam")
         kind = "IfcMember" if line.wall and kind == "IfcBeam" else kind
         use = "NOTDEFINED" if kind == "IfcTendon" else kind.removeprefix("Ifc").upper()
-        area = profile.area * self.square_metres
-        about = {"PredefinedType": use}
+        area, about = profile.area * self.square_metres, {"PredefinedType": use}
         if kind == "IfcTendon":
-            about["CrossSectionArea"] = area
-            about["TensionForce"] = max(line.forces) if line.forces and self.units.force else None
+            pull = max(line.forces) if line.forces and self.units.force else None
+            about |= {"CrossSectionArea": area, "TensionForce": pull}
         element = self.element(kind, f"member {line.name}", line.name, place, shape, **about)
         material = self.add("IfcMaterial", Name=f"material of {line.name}")
         of_profile = self.add("IfcMaterialProfile", Name=line.name, Material=material, Profile=section)
@@ -218,20 +209,17 @@ class _Model:
         used = self.add("IfcMaterialProfileSetUsage", ForProfileSet=profiles)
         ends = {"RelatedObjects": [element], "RelatingMaterial": used}
         self.rooted("IfcRelAssociatesMaterial", f"member {line.name} material", **ends)
-        stress, density = "IfcPlanarForceMeasure", "IfcMassDensityMeasure"
-        if not self.units.force:
-            stress = density = "IfcReal"
         values = {
             "Kind": ("IfcLabel", line.kind),
             "Area": ("IfcAreaMeasure", area),
             "SecondMomentUpright": ("IfcMomentOfInertiaMeasure", profile.moments[0]),
             "SecondMomentAcross": ("IfcMomentOfInertiaMeasure", profile.moments[1]),
-            "YoungsModulus": (stress, member.material.young),
+            "YoungsModulus": (self.of_force("IfcPlanarForceMeasure"), member.material.young),
             "PoissonsRatio": ("IfcReal", member.material.poisson),
-            "MassDensity": (density, member.material.density),
+            "MassDensity": (self.of_force("IfcMassDensityMeasure"), member.material.density),
         }
         for key, value in zip(("LeastForceAtRest", "LargestForceAtRest"), line.forces or (), strict=False):
-            values[key] = "IfcForceMeasure" if self.units.force else "IfcReal", value
+            values[key] = self.of_force("IfcForceMeasure"), value
         self.add_properties("Pcmc_Member", element, values, line.name)
         return element
 
@@ -250,29 +238,20 @@ class _Model:
 
     def polyline(self, places: Floats, closed: bool) -> Any:
         """A line through points (k,3)."""
-        points = (places - self.middle).tolist()
-        entities = [self.add("IfcCartesianPoint", Coordinates=point) for point in points]
-        return self.add("IfcPolyline", Points=entities + entities[:1] * closed)
+        points = [self.add("IfcCartesianPoint", Coordinates=at) for at in (places - self.middle).tolist()]
+        return self.add("IfcPolyline", Points=points + points[:1] * closed)
 
     def element(
         self, kind: str, role: str, name: str, place: Any, shape: tuple[Any, str, list[Any]], **values: Any
     ) -> Any:
         """A part of the roof; ``shape`` has the context, the type and the items of its representation."""
-        context, form, items = shape
-        where = self.placement(place)
-        representation = self.add(
-            "IfcShapeRepresentation",
-            ContextOfItems=context,
-            RepresentationIdentifier=context.ContextIdentifier,
-            RepresentationType=form,
-            Items=items,
-        )
+        (context, form, items), where = shape, self.placement(place)
+        about = {"RepresentationIdentifier": context.ContextIdentifier, "RepresentationType": form}
+        representation = self.add("IfcShapeRepresentation", ContextOfItems=context, Items=items, **about)
         whole = self.add("IfcProductDefinitionShape", Representations=[representation])
         return self.rooted(kind, role, Name=name, ObjectPlacement=where, Representation=whole, **values)
 
-    def add_properties(
-        self, name: str, of: Any, values: Mapping[str, tuple[str, Any]], role: str = ""
-    ) -> None:
+    def add_properties(self, name: str, of: Any, values: Properties, role: str = "") -> None:
         """A property set of an element: the type and value of each property."""
         listed = [
             self.add("IfcPropertySingleValue", Name=key, NominalValue=self.add(kind, value))
@@ -300,12 +279,12 @@ def _findings(certificate: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
 def assigned_units(add: Callable[..., Any], units: Units) -> Any:
     """The units of length, angle, area, volume, curvature and second moments, and with a unit of force those
     of forces, tension, pressure and density, whose mass is force · s² / length; ``add`` makes an entity."""
-    length = _unit(add, "LENGTHUNIT", "METRE", units.length, (1, 0, 0), length_factor(units.length, "m"))
+    length = _unit(add, "LENGTHUNIT", "METRE", units.length, [1, 0, 0], length_factor(units.length, "m"))
     kinds = {"AREAUNIT": "SQUARE_METRE", "VOLUMEUNIT": "CUBIC_METRE", "PLANEANGLEUNIT": "RADIAN"}
     listed = [length, *(add("IfcSIUnit", UnitType=kind, Name=name) for kind, name in kinds.items())]
     derived = [("CURVATUREUNIT", [(length, -1)]), ("MOMENTOFINERTIAUNIT", [(length, 4)])]
     if units.force:
-        force = _unit(add, "FORCEUNIT", "NEWTON", units.force, (1, 1, -2), NEWTONS[units.force])
+        force = _unit(add, "FORCEUNIT", "NEWTON", units.force, [1, 1, -2], NEWTONS[units.force])
         second = add("IfcSIUnit", UnitType="TIMEUNIT", Name="SECOND")
         listed += [force, second]
         derived += [("LINEARFORCEUNIT", [(force, 1), (length, -1)])]
@@ -317,17 +296,15 @@ def assigned_units(add: Callable[..., Any], units: Units) -> Any:
     return add("IfcUnitAssignment", Units=listed)
 
 
-def _unit(
-    add: Callable[..., Any], kind: str, name: str, unit: str, powers: tuple[int, int, int], factor: float
-) -> Any:
-    """A unit of the SI with its prefix, or one that is a multiple of it."""
+def _unit(add: Callable[..., Any], kind: str, name: str, unit: str, powers: list[int], size: float) -> Any:
+    """A unit of the SI with its prefix, or one of this ``size`` in it, such as a foot."""
     prefix = NAMES[unit] if NAMES[unit].isupper() else None
     plain = add("IfcSIUnit", UnitType=kind, Prefix=prefix, Name=name)
     if prefix or not NAMES[unit]:
         return plain
     exponents = add("IfcDimensionalExponents", *powers, 0, 0, 0, 0)
     measure = "IfcLengthMeasure" if kind == "LENGTHUNIT" else "IfcForceMeasure"
-    one = add("IfcMeasureWithUnit", ValueComponent=add(measure, factor), UnitComponent=plain)
+    one = add("IfcMeasureWithUnit", ValueComponent=add(measure, size), UnitComponent=plain)
     about = {"UnitType": kind, "Name": NAMES[unit], "ConversionFactor": one}
     return add("IfcConversionBasedUnit", Dimensions=exponents, **about)
 

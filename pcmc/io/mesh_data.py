@@ -230,12 +230,8 @@ def in_new_unit(value: Any, factor: float) -> Any:
         case Patch() | Cable() | Room():
             parts = {Patch: "patches", Cable: "cables", Room: "rooms"}[type(value)]
             powers = {kind.field: POWERS[kind.dimension] for kind in KINDS.values() if kind.parts == parts}
-            old = {field: getattr(value, field) for field in powers}
-            new = {
-                f: x * factor ** powers[f] if powers[f] > 0 else x / factor ** -powers[f]
-                for f, x in old.items()
-            }
-            return replace(value, **new)
+            old = [(f, getattr(value, f), factor ** abs(p), p > 0) for f, p in powers.items()]
+            return replace(value, **{f: x * by if up else x / by for f, x, by, up in old})
         case Plane() | Line():
             return replace(value, point=_point(value.point, factor))
         case Circle():

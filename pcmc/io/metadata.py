@@ -153,8 +153,8 @@ def parse_metadata(text: str | None) -> Metadata:
 
 
 def _damaged(text: str) -> FileError:
-    message = f"the pcmc metadata in it are damaged: {text[:60]!r}"
-    return FileError(message, where="metadata", found=text[:60])
+    text = text[:60]
+    return FileError(f"the pcmc metadata in it are damaged: {text!r}", where="metadata", found=text)
 
 
 def with_parts(data: MeshData) -> MeshData:
@@ -214,18 +214,10 @@ def with_parts(data: MeshData) -> MeshData:
         on_planes = () if off in lost else tuple((Plane(*row), own) for row, own in planes)
     except DAMAGED:
         raise _damaged(str(dict(parts))) from None
-    return replace(
-        data,
-        vertices=X,
-        support=support,
-        cables=tuple(cables),
-        rooms=rooms,
-        lines=guides,
-        planes=on_planes,
-        order=order,
-        images=images,
-        notes=(*data.notes, *([f"{', '.join(lost)}: {CHANGED}"] if lost else [])),
-    )
+    notes = (*data.notes, *([f"{', '.join(lost)}: {CHANGED}"] if lost else []))
+    found: dict[str, Any] = {"cables": tuple(cables), "rooms": rooms, "lines": guides, "planes": on_planes}
+    found |= {"order": order, "images": images}
+    return replace(data, vertices=X, support=support, notes=notes, **found)
 
 
 WALLS = "pcmc walls"  # the key of their text in a file
@@ -268,15 +260,15 @@ def encode_walls(surface: Surface, shown: Surface) -> str:
     wall = surface.auxiliary[surface.patch_of_face]
     used, local = np.unique(surface.faces[wall], return_inverse=True)
     values = {
-        "vertices": surface.vertices[used].tolist(),
-        "support": support_of(surface)[used].tolist(),
-        "above": np.isin(used, surface.faces[~wall]).tolist(),
-        "faces": local.reshape(-1, 3).tolist(),
-        "patch": surface.patch_of_face[wall].tolist(),
-        "patches": [row_of(p) for p in surface.patches],
-        "shown": int(np.count_nonzero(shown.auxiliary[shown.patch_of_face])),
+        "vertices": surface.vertices[used],
+        "support": support_of(surface)[used],
+        "above": np.isin(used, surface.faces[~wall]),
+        "faces": local.reshape(-1, 3),
+        "patch": surface.patch_of_face[wall],
+        "shown": np.count_nonzero(shown.auxiliary[shown.patch_of_face]),
     }
-    return json.dumps(values)
+    plain = {name: np.asarray(value).tolist() for name, value in values.items()}
+    return json.dumps(plain | {"patches": [row_of(p) for p in surface.patches]})
 
 
 def restore_walls(data: MeshData) -> MeshData:
@@ -287,9 +279,8 @@ def restore_walls(data: MeshData) -> MeshData:
     names = {walls.patches[k].name for k in walls.patch_of_face}
     is_wall = np.array([p.name in names for p in data.patches])[data.patch_of_face]
     sheets = np.unique(data.faces[~is_wall])
-    reach = ROUNDING * bounding_size(data.vertices)
     far, near = cKDTree(data.vertices[sheets]).query(walls.vertices[above])
-    if np.count_nonzero(is_wall) != shown or np.any(far > reach):
+    if np.count_nonzero(is_wall) != shown or np.any(far > ROUNDING * bounding_size(data.vertices)):
         return replace(data, walls=None, notes=(*data.notes, WALLS_CHANGED))
     n, below = len(data.vertices), ~above
     place = np.empty(len(below), dtype=np.int64)
@@ -299,21 +290,15 @@ def restore_walls(data: MeshData) -> MeshData:
     support = np.zeros(len(X), dtype=np.int8)
     support[:n] = 0 if data.support is None else data.support
     support[place] = np.asarray(walls.support)
-    patches = list(data.patches)
-    patches += [p for p in walls.patches if p.name in names - {q.name for q in patches}]
+    patches = [*data.patches, *(p for p in walls.patches if p.name in names - {q.name for q in data.patches})]
     number = {p.name: k for k, p in enumerate(patches)}
     patch = np.array([number.get(p.name, -1) for p in walls.patches])[walls.patch_of_face]
     beside = cKDTree(data.vertices).query(walls.vertices[below])[1]
-    whole = replace(
-        data,
-        vertices=X,
-        faces=np.concatenate([data.faces[~is_wall], place[walls.faces]]),
-        patch_of_face=np.concatenate([data.patch_of_face[~is_wall], patch]),
-        patches=tuple(patches),
-        support=support,
-        scalars={k: np.concatenate([v, v[beside]]) for k, v in data.scalars.items()},
-        walls=None,
-    )
+    F = np.concatenate([data.faces[~is_wall], place[walls.faces]])
+    of_face = np.concatenate([data.patch_of_face[~is_wall], patch])
+    scalars = {k: np.concatenate([v, v[beside]]) for k, v in data.scalars.items()}
+    mesh: dict[str, Any] = {"vertices": X, "faces": F, "patch_of_face": of_face, "patches": tuple(patches)}
+    whole = replace(data, **mesh, support=support, scalars=scalars, walls=None)
     return replace(without_unused(whole), notes=data.notes)
 
 

@@ -46,16 +46,10 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     }
     arrays: dict[str, Any] = {f"scalar {name}": value for name, value in content.scalars.items()}
     arrays |= {f"certificate {name}": value for name, value in tables.items()}
+    mesh = {name: getattr(surface, name) for name in ("vertices", "faces", "patch_of_face")}
+    text = np.array(json.dumps(meta, default=_plain))
     with path.open("wb") as file:
-        np.savez_compressed(
-            file,
-            meta=np.array(json.dumps(meta, default=_plain)),
-            vertices=surface.vertices,
-            faces=surface.faces,
-            patch_of_face=surface.patch_of_face,
-            support=support_of(surface),
-            **arrays,
-        )
+        np.savez_compressed(file, meta=text, **mesh, support=support_of(surface), **arrays)
 
 
 def read(path: Path) -> MeshData:

@@ -64,15 +64,15 @@ def read(path: Path) -> MeshData:
     support = np.full(len(X), FREE, dtype=np.int8)
     points = list(POINT.finditer(file.text)) if HELD.keys() & set(groups.tolist()) else []
     for point, group in zip(points, groups[np.searchsorted(starts, _places(points))], strict=True):
+        if group not in HELD:
+            continue
         numbered = np.array(point[1].split(), dtype=np.float64)
-        if group in HELD and not (numbered.min() >= 1 and numbered.max() <= len(X)):
-            problem = f"a point here is outside 1..{len(X)}"
-            raise file.error(problem, offset=point.start(), found=point[0])
-        if group in HELD:
-            support[numbered.astype(np.int64) - 1] = HELD[group]
+        if not (numbered.min() >= 1 and numbered.max() <= len(X)):
+            outside = f"a point here is outside 1..{len(X)}"
+            raise file.error(outside, offset=point.start(), found=point[0])
+        support[numbered.astype(np.int64) - 1] = HELD[group]
     sizes = np.array([len(part) for part in parts])
-    patch, patches = pd.factorize(groups[sizes > 0])
-    patch = np.repeat(patch, sizes[sizes > 0])
+    patch, patches = pd.factorize(np.repeat(groups, sizes))
     F, source, notes = cut_polygons(X, corners, counts)
     metadata.check_counts(len(X), len(F))
     known = support if comment or support.any() else None
@@ -95,8 +95,7 @@ def _vertices(file: TextSection) -> Floats:
         try:
             [parsed(c) for c in line[0].split()[1:4]][2]
         except (ValueError, IndexError):
-            problem = "expected three coordinates"
-            raise file.error(problem, offset=line.start(), found=line[0]) from None
+            raise file.error("expected three coordinates", offset=line.start(), found=line[0]) from None
     raise FileError("its vertices cannot be read", where="vertices")
 
 

@@ -59,9 +59,6 @@ def write(path: Path, surface: Surface, content: Content) -> None:
             file.write(np.rec.fromarrays(list(columns.values()), dtype=np.dtype(dtype)).tobytes())
 
 
-# Reading
-
-
 @dataclass(frozen=True)
 class _Element:
     """An element of the header; a property is (name, type), at most one is (name, type, type of items)."""
@@ -170,8 +167,7 @@ def _rows(element: _Element, data: bytes, start: int) -> tuple[dict[str, Any], i
             return found
         count = found[column][0]
         if not 0 <= count <= len(data) or count != int(count):
-            text = f"{element.name} {number} lists {count} items"
-            raise FileError(text, where=number, found=count.item())
+            raise FileError(f"{element.name} {number} lists {count} items", where=number, found=count.item())
         need(offset + row(int(count)).itemsize)
         return np.frombuffer(data, row(int(count)), 1, offset)
 

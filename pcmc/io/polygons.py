@@ -16,6 +16,7 @@ from .mesh_data import MeshData, support_kinds
 from .metadata import Metadata
 
 LARGEST = 200  # corners of a polygon: all fans of one are compared, which are their square
+ELSEWHERE = "in the program that wrote it, or with pcmc repair"
 AT_ONCE = 1 << 18  # triangles of fans compared at once: a hundred megabytes
 LABELS = ("patch", "PatchId", "RegionId", "GroupIds", "MaterialIds", "medit:ref", "gmsh:physical")
 """Cell data that may hold the patch of each face; the first of these in the file counts."""
@@ -31,15 +32,11 @@ def cut_polygons(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tu
     >>> cut_polygons(X, np.array([0, 1, 2, 3]), np.array([4]))[0].tolist()
     [[1, 2, 3], [1, 3, 0]]
     """
-    few = np.flatnonzero(counts < 3)
-    if len(few):
-        text = f"face {few[0]} has {counts[few[0]]} corners; a face needs three or more"
-        raise FileError(text, where=int(few[0]))
-    many = np.flatnonzero(counts > LARGEST)
-    if len(many):
-        text = f"face {many[0]} has {counts[many[0]]} corners, more than {LARGEST}; cut it into triangles"
-        text = f"{text} in the program that wrote it, or with pcmc repair"
-        raise FileError(text, where=int(many[0]), found=int(counts[many[0]]), expected=LARGEST)
+    if len(odd := np.flatnonzero((counts < 3) | (counts > LARGEST))):
+        at, k = int(odd[0]), int(counts[odd[0]])
+        more = f"more than {LARGEST}; cut it into triangles {ELSEWHERE}"
+        text = f"face {at} has {k} corners{'; a face needs three or more' if k < 3 else f', {more}'}"
+        raise FileError(text, where=at, found=k, expected=(3, LARGEST))
     if (counts == 3).all():
         return corners.reshape(-1, 3), np.arange(len(counts)), ()
     checks.positions(X)
@@ -53,9 +50,9 @@ def cut_polygons(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tu
             origin.append(np.repeat(chosen, k - 2))
     source = np.concatenate(origin)
     order = np.argsort(source, kind="stable")
-    quads, more = np.count_nonzero(counts == 4), np.count_nonzero(counts > 4)
-    parts = [f"{quads} quads" if quads else "", f"{more} polygons" if more else ""]
-    note = f"{' and '.join(filter(None, parts))} were cut into triangles"
+    quads, many = np.count_nonzero(counts == 4), np.count_nonzero(counts > 4)
+    parts = [f"{n} {kind}" for n, kind in ((quads, "quads"), (many, "polygons")) if n]
+    note = f"{' and '.join(parts)} were cut into triangles"
     return np.concatenate(triangles)[order], source[order], (note,)
 
 
@@ -75,9 +72,8 @@ def _best_fans(X: Floats, polygon: Ints, number: Ints) -> Ints:
     best = worst.argmax(axis=0)
     bad = np.flatnonzero(worst.max(axis=0) < 0.0)  # one without area becomes triangles without area
     if len(bad):
-        text = f"face {number[bad[0]]} is a polygon of {k} corners that no fan of triangles fills; cut it"
-        text = f"{text} in the program that wrote it, or with pcmc repair"
-        raise FileError(text, where=int(number[bad[0]]), found=int(k))
+        at, text = int(number[bad[0]]), f"is a polygon of {k} corners that no fan of triangles fills; cut it"
+        raise FileError(f"face {at} {text} {ELSEWHERE}", where=at, found=int(k))
     return fans[best, np.arange(len(polygon))]
 
 
@@ -112,8 +108,7 @@ def from_polygons(
         described = list(metadata.patches)
         known = label == "patch" and values.min() >= 0 and values.max() < len(described)
         names = [described[int(v)] if known else f"patch {v}" for v in values.tolist()]
-    support = point_data.get("support")
-    support = None if support is None else support_kinds(support)
+    support = support_kinds(point_data["support"]) if "support" in point_data else None
     scalars = _scalars(point_data, "support", len(X))
     scalars |= {k: v[source] for k, v in _scalars(cell_data, label, len(counts)).items()}
     about: dict[str, Any] = {"support": support, "scalars": scalars, "joined": metadata.counts is not None}

@@ -190,60 +190,47 @@ def import_warnings(data: MeshData, path: str | os.PathLike[str] = "FILE") -> tu
         return ()
     topo = topology(data.faces, data.patch_of_face, len(data.vertices))
     outer = topo.edges[topo.boundary_edge]
-    seam, axis = _open_seam(data.vertices, outer), _up(data, outer)
-    turn = f"the surface faces {axis}, but z is up here; if {axis} was up, turn it: pcmc repair"
-    wrong_up = f"{turn} {os.fspath(path)} -o turned.obj --up {axis}" if axis else ""
     opposed, wrong = "", np.flatnonzero(topo.one_way_edge & topo.seam_edge)
     if len(wrong):
         faces = np.flatnonzero((topo.edge_of_face == wrong[0]).any(axis=1))
         a, b = (data.patches[k].name for k in data.patch_of_face[faces])
-        opposed = (
-            f"patches {a!r} and {b!r} are turned against each other: their pressures act to opposite"
-            " sides; unless you want that, reverse the faces of one"
-        )
-    return tuple(filter(None, (seam, opposed, wrong_up, "" if axis else _down(data, path))))
+        opposed = f"patches {a!r} and {b!r} are turned against each other: their pressures act to opposite"
+        opposed += " sides; unless you want that, reverse the faces of one"
+    seam, turned = _open_seam(data.vertices, outer), _turned(data, outer, os.fspath(path))
+    return tuple(filter(None, (seam, opposed, turned)))
 
 
 def _open_seam(X: Floats, outer: Ints) -> str:
     if not len(outer):
         return ""
-    length = segment_lengths(X, outer)
-    beside = np.full(len(X), np.inf)
-    np.minimum.at(beside, outer.ravel(), np.repeat(length, 2))
-    rim = np.unique(outer)
-    distances, neighbours = map(np.asarray, cKDTree(X[rim]).query(X[rim], k=2))
-    apart, near = distances[:, 1], neighbours[:, 1]
+    rim, beside = np.unique(outer), np.full(len(X), np.inf)
+    np.minimum.at(beside, outer.ravel(), np.repeat(segment_lengths(X, outer), 2))
+    apart, near = (np.asarray(found)[:, 1] for found in cKDTree(X[rim]).query(X[rim], k=2))
     close = apart < GAP * np.minimum(beside[rim], beside[rim[near]])
     if not close.any():
         return ""
-    place = X[rim[close][0]].round(4).tolist()
-    return (
-        f"a seam is open: {np.count_nonzero(close)} boundary vertices are within"
-        f" {apart[close].max():.2g} of another one, the first at {place}; join them in the program that"
-        " drew the mesh, or with pcmc repair --weld"
-    )
+    far, place = f"{apart[close].max():.2g}", X[rim[close][0]].round(4).tolist()
+    text = f"a seam is open: {np.count_nonzero(close)} boundary vertices are within {far} of another one, the"
+    return f"{text} first at {place}; join them in the program that drew the mesh, or with pcmc repair --weld"
 
 
-def _down(data: MeshData, path: str | os.PathLike[str]) -> str:
-    """A sentence where most triangles of a roof look down."""
-    down = -area_vectors(data.vertices[data.faces])
-    if down[:, 2].sum() <= FACES_ONE_WAY * float(np.linalg.norm(down, axis=1).sum()):
+def _turned(data: MeshData, outer: Ints, path: str) -> str:
+    """A sentence where x or y was up, by the sum of area vectors and the best plane of the boundary, or where
+    most triangles of a roof look down."""
+    vectors = area_vectors(data.vertices[data.faces])
+    total, area = vectors.sum(axis=0), float(np.linalg.norm(vectors, axis=1).sum())
+    size, rim, across = float(np.linalg.norm(total)), data.vertices[np.unique(outer)], np.zeros(3)
+    if size > FACES_ONE_WAY * area and abs(total[2]) <= FACES_UP * size:
+        across = np.abs(total)
+    elif len(rim) >= 3:
+        _, spread, axes = np.linalg.svd(rim - rim.mean(axis=0), full_matrices=False)
+        if spread[2] < FLAT * spread[1] and np.abs(axes[2, :2]).max() > UPRIGHT:
+            across = np.abs(axes[2])
+    if across.any():
+        axis = "xy"[int(across[:2].argmax())]
+        turn = f"the surface faces {axis}, but z is up here; if {axis} was up, turn it: pcmc repair"
+        return f"{turn} {path} -o turned.obj --up {axis}"
+    if -total[2] <= FACES_ONE_WAY * area:
         return ""
-    turn = f"turn them: pcmc repair {os.fspath(path)} -o turned.obj"
+    turn = f"turn them: pcmc repair {path} -o turned.obj"
     return f"the triangles face down, so a pressure above 0 pushes the roof down; if it is to rise, {turn}"
-
-
-def _up(data: MeshData, outer: Ints) -> str:
-    """The axis that was up, "x" or "y", by the sum of area vectors and the best plane of the boundary."""
-    vector = area_vectors(data.vertices[data.faces])
-    total = np.abs(vector.sum(axis=0))
-    size = float(np.linalg.norm(total))
-    if size > FACES_ONE_WAY * float(np.linalg.norm(vector, axis=1).sum()) and total[2] <= FACES_UP * size:
-        return "xy"[int(total[:2].argmax())]
-    rim = data.vertices[np.unique(outer)]
-    if len(rim) < 3:
-        return ""
-    _, spread, axes = np.linalg.svd(rim - rim.mean(axis=0), full_matrices=False)
-    normal = np.abs(axes[2])
-    upright = spread[2] < FLAT * spread[1] and normal[:2].max() > UPRIGHT
-    return "xy"[int(normal[:2].argmax())] if upright else ""

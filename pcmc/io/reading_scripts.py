@@ -91,8 +91,7 @@ def rhino_arrays(path: str) -> dict[str, Any]:
         elif isinstance(geometry, rhino.PolylineCurve):
             held["line"] = coordinates(geometry.Point(k) for k in range(geometry.PointCount))
         objects.append(held)
-    unit = str(model.Settings.ModelUnitSystem.name)
-    return {"layers": layers, "objects": objects, "unit": unit}
+    return {"layers": layers, "objects": objects, "unit": str(model.Settings.ModelUnitSystem.name)}
 
 
 def ifc_arrays(path: str) -> dict[str, Any]:
@@ -100,7 +99,7 @@ def ifc_arrays(path: str) -> dict[str, Any]:
     import ifcopenshell
     from ifcopenshell.util import element, placement
 
-    get_pset, get_local_placement = element.get_pset, placement.get_local_placement
+    get_pset: Any = element.get_pset
     model: Any = ifcopenshell.open(path)
     found: dict[str, Any] = {"text": None, "walls": None, "parts": []}
     for roof in model.by_type("IfcRoof"):
@@ -113,15 +112,11 @@ def ifc_arrays(path: str) -> dict[str, Any]:
                 continue
             item = part.Representation.Representations[0].Items[0]
             points = np.array(item.Coordinates.CoordList, dtype=np.float64).reshape(-1, 3)
-            place = get_local_placement(part.ObjectPlacement)
-            found["parts"].append(
-                {
-                    "name": part.Name,
-                    "points": points @ place[:3, :3].T + place[:3, 3],
-                    "faces": np.array(item.CoordIndex, dtype=np.int64).reshape(-1, 3) - 1,
-                    "supports": get_pset(part, "Pcmc_Patch", "Supports"),
-                }
-            )
+            place = placement.get_local_placement(part.ObjectPlacement)
+            mesh: dict[str, Any] = {"points": points @ place[:3, :3].T + place[:3, 3]}
+            mesh["faces"] = np.array(item.CoordIndex, dtype=np.int64).reshape(-1, 3) - 1
+            supports = get_pset(part, "Pcmc_Patch", "Supports")
+            found["parts"].append({"name": part.Name, "supports": supports, **mesh})
         break
     return found
 
@@ -133,9 +128,7 @@ def meshlab_arrays(path: str) -> dict[str, Any]:
     meshes = pymeshlab.MeshSet()
     meshes.load_new_mesh(path)
     parts = [meshes.mesh(k) for k in range(meshes.mesh_number())]
-    return {
-        "meshes": [(part.label(), part.transformed_vertex_matrix(), part.face_matrix()) for part in parts]
-    }
+    return {"meshes": [(one.label(), one.transformed_vertex_matrix(), one.face_matrix()) for one in parts]}
 
 
 def repaired_arrays(path: str) -> dict[str, Any]:
@@ -163,7 +156,8 @@ def repaired_arrays(path: str) -> dict[str, Any]:
             length = pymeshlab.PureValue(edge_length)
             options = {"iterations": ROUNDS, "targetlen": length, "checksurfdist": False}
             meshes.meshing_isotropic_explicit_remeshing(**options)
-            X, F = meshes.current_mesh().vertex_matrix(), meshes.current_mesh().face_matrix()
+            mesh = meshes.current_mesh()
+            X, F = mesh.vertex_matrix(), mesh.face_matrix()
             return {"points": X, "faces": F, "patch": np.full(len(F), number), "changes": dict(changes)}
         first = np.zeros(len(vertex), dtype=bool)
         first[np.unique(vertex, return_index=True)[1]] = True
@@ -173,14 +167,9 @@ def repaired_arrays(path: str) -> dict[str, Any]:
         n += int(np.count_nonzero(~first))
         faces.append(new[local])
         owner.append(np.full(len(local), number))
-    everything = np.concatenate(faces)
-    used, inverse = np.unique(everything, return_inverse=True)
-    return {
-        "points": np.concatenate(points)[used],
-        "faces": inverse.reshape(-1, 3),
-        "patch": np.concatenate(owner),
-        "changes": dict(changes),
-    }
+    used, inverse = np.unique(np.concatenate(faces), return_inverse=True)
+    X, F = np.concatenate(points)[used], inverse.reshape(-1, 3)
+    return {"points": X, "faces": F, "patch": np.concatenate(owner), "changes": dict(changes)}
 
 
 def _meshset(X: Any, F: Any, **data: Any) -> Any:
@@ -256,17 +245,15 @@ def _repaired_patch(X: Any, F: Any, single: Any, holes: int, changes: Any) -> tu
     changes["triangles turned"] += min(np.count_nonzero(turned), np.count_nonzero(~turned))
     over = bool(2 * np.count_nonzero(turned) > len(turned))
     faces = mesh.face_matrix()
-    size = len(faces)
     if holes >= 3:
         meshes.meshing_close_holes(maxholesize=holes, newfaceselected=True, selfintersection=False)
         mesh = meshes.current_mesh()
-        faces = _without_large_fills(mesh, size, _vertices(mesh), single, changes)
-    points = meshes.current_mesh().vertex_matrix()
-    up = _area_vectors(points, faces)[:, 2]
+        faces = _without_large_fills(mesh, len(faces), _vertices(mesh), single, changes)
+    up = _area_vectors(mesh.vertex_matrix(), faces)[:, 2]
     if abs(up.sum()) > 0.01 * np.abs(up).sum() and up.sum() < 0.0:  # a roof that looks down
         faces, over = faces[:, ::-1], not over
     changes["patches turned over"] += int(over)
-    return faces, _vertices(meshes.current_mesh())
+    return faces, _vertices(mesh)
 
 
 def _vertices(mesh: Any) -> Any:

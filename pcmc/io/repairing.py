@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -45,7 +46,7 @@ class Repaired:
     def __str__(self) -> str:
         """The changes and notes in one line."""
         counts = (f"{number} {done}" for done, number in self.changes.items())
-        return "; ".join([*counts, *self.notes]) or "nothing to repair"
+        return "; ".join((*counts, *self.notes)) or "nothing to repair"
 
 
 def repair(
@@ -115,28 +116,23 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
 
         least = math.sqrt(np.nansum(triangles_for(face_areas(X[F]), np.ones(len(F)))) / MOST)
         if edge_length < least:
-            text = f"edge_length = {edge_length:g} would make more than {MOST} triangles"
-            text = f"{text}; use {1.01 * least:.2g} or more"
+            better = f"use {1.01 * least:.2g} or more"
+            text = f"edge_length = {edge_length:g} would make more than {MOST} triangles; {better}"
             raise OptionError(text, what="edge_length", found=edge_length, expected=least)
     with tempfile.TemporaryDirectory() as folder:
-        request = Path(folder) / "mesh.npz"
-        np.savez(
-            request,
-            points=X,
-            faces=F,
-            patch=data.patch_of_face,
-            weld=WELD * size if weld is None else weld,
-            holes=holes,
-            edge_length=0.0 if edge_length is None or several else edge_length,
-        )
+        request, patch, near = Path(folder) / "mesh.npz", data.patch_of_face, WELD * size
+        options: dict[str, Any] = {"weld": near if weld is None else weld, "holes": holes}
+        options["edge_length"] = 0.0 if edge_length is None or several else edge_length
+        np.savez(request, points=X, faces=F, patch=patch, **options)
         answer = read_arrays("io/reading_scripts.py", "repaired_arrays", request)
     kept, patch = np.unique(answer["patch"], return_inverse=True)  # one may have vanished
     patches = tuple(data.patches[k] for k in kept)
     surface = to_surface(MeshData(answer["points"], answer["faces"], patch, patches, plane=data.plane))
     changes = {done: number for done, number in answer["changes"].items() if number}
-    names = ("cables", "rooms", "planes", "lines")
-    given = {name: getattr(data, name) or data.parts.get(name) for name in names}
-    given = {"supports": data.support is not None and np.any(data.support), **given}
+    given: dict[str, Any] = {"supports": data.support is not None and np.any(data.support)}
+    given |= {
+        key: getattr(data, key) or data.parts.get(key) for key in ("cables", "rooms", "planes", "lines")
+    }
     given["curved elements"] = max(data.order, data.parts.get("order", 1)) > 1
     given["images"] = len(data.images) + len(data.parts.get("images", ())) > 0
     left_out = ", ".join(name for name, there in given.items() if there)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -20,7 +19,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats
 from ..base.errors import FileError
 from ..base.libraries import load_library, read_arrays, require
 from ..base.units import TABLE, Units, length_factor, unit_in_file
@@ -70,13 +69,11 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         model.Objects.AddMesh(mesh, attributes)
     if content.walls is not None:
         model.Layers[0].SetUserString(WALLS, content.walls)  # of the whole model, so once
-    support = support_of(surface)
     for name, kind in HELD.items():
-        held = surface.vertices[support == kind]
+        held, cloud = surface.vertices[support_of(surface) == kind], rhino.PointCloud()
+        for point in held.tolist():
+            cloud.Add(rhino.Point3d(*point))
         if len(held):
-            cloud = rhino.PointCloud()
-            for point in held.tolist():
-                cloud.Add(rhino.Point3d(*point))
             model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], content.metadata))
     _add_curves(rhino, model, surface, replaced, content)
     for member in content.members:
@@ -92,18 +89,14 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         raise FileError("rhino3dm cannot write it; check that the folder exists and the disk has space")
 
 
-def _add_curves(
-    rhino: Any, model: Any, surface: Surface, replaced: Collection[str], content: Content
-) -> None:
+def _add_curves(rhino: Any, model: Any, surface: Surface, replaced: set[str], content: Content) -> None:
     """Ridges, rims, wall lines and cables with their sections as polylines, each kind and each cable on its
     layer; none of walls that are ``replaced``."""
     layers: dict[str, Any] = {}
     curves = [(f"PCMC-{kind}", curve, "") for kind, curve in curves_by_kind(surface, replaced)]
-    free = np.zeros(surface.n, dtype=bool)
     for cable in surface.cables:
-        named, weight = f"cable {cable.name}", [cable.weight] * bool(cable.weight)
-        own = json.dumps([cable.name, cable.tension, *weight])
-        curves += [(named, chain, own) for chain in surface.topology.chains(cable.edges, free)]
+        own = json.dumps([cable.name, cable.tension, *[cable.weight] * bool(cable.weight)])
+        curves += [(f"cable {cable.name}", chain, own) for chain in surface.topology.chains(cable.edges)]
     for name, curve, cable_text in curves:
         if name not in layers:
             layers[name] = _layer(rhino, model, name, CURVES.get(name, COLORS["cable"]), "", cable_text)
@@ -123,11 +116,10 @@ def _add_line(rhino: Any, model: Any, points: Floats, closed: bool, attributes: 
 
 def _layer(rhino: Any, model: Any, name: str, color: tuple[int, ...], text: str = "", cable: str = "") -> Any:
     """A new layer, and object attributes that put an object on it."""
-    layer = rhino.Layer()
+    layer, attributes = rhino.Layer(), rhino.ObjectAttributes()
     layer.Name, layer.Color = name, color
-    for key, value in ((KEY, text), (CABLE, cable)):
-        layer.SetUserString(key, value)
-    attributes = rhino.ObjectAttributes()
+    layer.SetUserString(KEY, text)
+    layer.SetUserString(CABLE, cable)
     attributes.LayerIndex, attributes.Name = model.Layers.Add(layer), name
     added = model.Layers[attributes.LayerIndex]
     if added.Name != name:  # Rhino's names do not begin with a bracket, nor differ in case alone
@@ -141,7 +133,7 @@ def read(path: Path) -> MeshData:
     arrays = read_arrays("io/reading_scripts.py", "rhino_arrays", path)
     layers = arrays["layers"]
     X, corners, counts, named = [], [], [], []
-    held: dict[int, list[Floats]] = {FIXED: [], SLIDING: []}
+    held: dict[int, list[Floats]] = {SLIDING: [], FIXED: []}  # where a point is in both, it is fixed
     metadata, walls, others, start = Metadata(), None, 0, 0
     cables: dict[str, list[Any]] = {}
     for item in arrays["objects"]:
@@ -176,30 +168,24 @@ def read(path: Path) -> MeshData:
         own = metadata.units.length or UNIT
         factor, model = length_factor(model, own), own
         X = [factor * points for points in X]
-        rows = [
-            [name, pull, (factor * np.array(pairs)).tolist(), *weight]
-            for text, pairs in cables.items()
-            for name, pull, *weight in [json.loads(text)]
-        ]
+        rows = []
+        for text, pairs in cables.items():
+            cable, pull, *weight = json.loads(text)
+            rows.append([cable, pull, (factor * np.array(pairs)).tolist(), *weight])
         metadata = replace(metadata, parts={**metadata.parts, "cables": rows})
         held = {kind: [factor * points for points in parts] for kind, parts in held.items()}
     points = np.concatenate(X)
     F, source, cut = cut_polygons(points, np.concatenate(corners), np.concatenate(counts))
-    notes = (*filter(None, (note,)), *cut)
-    if others:
-        notes = (*notes, f"{others} objects that are not meshes were left out")
-    support = _supports(points, held) if metadata.plane is not None or any(held.values()) else None
+    left_out = f"{others} objects that are not meshes were left out" if others else ""
+    notes = [*filter(None, (note, *cut, left_out))]
+    support = None
+    if metadata.plane is not None or any(held.values()):
+        support = np.full(len(points), FREE, dtype=np.int8)
+        tree, reach = cKDTree(points), TOLERANCE * bounding_size(points)
+        for kind, clouds in held.items():
+            for near in tree.query_ball_point(np.concatenate([np.empty((0, 3)), *clouds]), reach):
+                support[near] = kind
     patch, names = pd.factorize(np.array(named, dtype=object))
     units = Units(model, metadata.units.force if model else "")
     about: dict[str, Any] = {"support": support, "walls": walls, "units": units}
     return metadata.mesh_data(points, F, patch[source], names.tolist(), notes, **about)
-
-
-def _supports(X: Floats, held: dict[int, list[Floats]]) -> Ints:
-    support = np.full(len(X), FREE, dtype=np.int8)
-    tree, reach = cKDTree(X), TOLERANCE * bounding_size(X)
-    for kind in (SLIDING, FIXED):
-        for points in held[kind]:
-            for near in tree.query_ball_point(points, reach):
-                support[near] = kind
-    return support

@@ -36,21 +36,18 @@ def write(path: Path, surface: Surface, _: Content) -> str:
     normal = area_vectors(P)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     lines = np.concatenate([normal, P.reshape(-1, 9)], axis=1)
-    for name in (patch.name for patch in surface.patches):
-        if word := SPECIAL.search(name):
-            text = f"the patch name {name!r} has the word {word[0]!r} of the format; rename the patch"
-            raise FileError(text, where="patches", found=name)
+    for patch in surface.patches:
+        if word := SPECIAL.search(patch.name):
+            text = f"the patch name {patch.name!r} has the word {word[0]!r} of the format; rename the patch"
+            raise FileError(text, where="patches", found=patch.name)
     with path.open("w", encoding="utf-8", newline="\n") as file:
         for k, patch in enumerate(surface.patches):
             chosen = lines[surface.patch_of_face == k]
             if len(chosen):
                 file.write(f"solid {patch.name}\n{format_rows(FACET, *chosen.T)}endsolid {patch.name}\n")
-    if not moved:
-        return ""
-    return (
-        f"its coordinates are relative to {[int(c) for c in middle]}, because .stl keeps seven digits;"
-        " add this point where you read the file, or write .obj or .3dm, which keep all digits"
-    )
+    text = f"its coordinates are relative to {[int(c) for c in middle]}, because .stl keeps seven digits; add"
+    text += " this point where you read the file, or write .obj or .3dm, which keep all digits"
+    return text if moved else ""
 
 
 def read(path: Path) -> MeshData:

@@ -144,9 +144,8 @@ class TextSection:
             return parsed_numbers(words)
         except ValueError:
             rows = range(len(words)) if row is None else [row] * len(words)
-            fails = (partial(self.error, row=k) for k in rows)
-            values = [constant(w, self.known, fail) for w, fail in zip(words, fails, strict=True)]
-            return np.array(values)
+            named = zip(words, rows, strict=True)
+            return np.array([constant(word, self.known, partial(self.error, row=k)) for word, k in named])
 
     def values(self, rest: Sequence[str], key: str, default: float = 0.0) -> tuple[Floats, Bools]:
         """(k,) the number after a key in what follows each element, and where there is one."""

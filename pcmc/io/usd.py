@@ -37,11 +37,9 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     UsdGeom.SetStageMetersPerUnit(stage, length_factor(content.units.length, "m"))
     roof: Any = UsdGeom.Xform.Define(stage, ROOF)
     stage.SetDefaultPrim(roof.GetPrim())
-    roof.GetPrim().SetCustomDataByKey("pcmc", content.metadata)
-    if content.mark:
-        roof.GetPrim().SetCustomDataByKey("mark", content.mark)
-    if content.walls is not None:
-        roof.GetPrim().SetCustomDataByKey("walls", content.walls)
+    for key, text in {"pcmc": content.metadata, "mark": content.mark, "walls": content.walls}.items():
+        if text:
+            roof.GetPrim().SetCustomDataByKey(key, text)
     middle = file_origin(surface.vertices, surface.size)
     if middle.any():
         roof.AddTranslateOp().Set(tuple(middle.tolist()))
@@ -59,14 +57,12 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
         mesh.CreateDoubleSidedAttr(True)
         shown = color[None] if shades is None else shades[used]
-        interpolation = UsdGeom.Tokens.constant if shades is None else UsdGeom.Tokens.vertex
-        colors = mesh.CreateDisplayColorPrimvar(interpolation)
+        colors = mesh.CreateDisplayColorPrimvar("constant" if shades is None else "vertex")
         colors.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(shown, dtype=np.float32)))
         primvars = UsdGeom.PrimvarsAPI(mesh)
         for name, values in at_vertices.items():
-            key = re.sub(r"\W+", "_", name)
-            primvar = primvars.CreatePrimvar(key, Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.vertex)
-            primvar.Set(Vt.FloatArray.FromNumpy(values[used].astype(np.float32)))
+            kind = re.sub(r"\W+", "_", name), Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.vertex
+            primvars.CreatePrimvar(*kind).Set(Vt.FloatArray.FromNumpy(values[used].astype(np.float32)))
         _bind_material(stage, mesh, k, color, vertex_colors=shades is not None)
     path.write_text(stage.GetRootLayer().ExportToString(), encoding="utf-8")
 

@@ -94,10 +94,8 @@ def write(
     if certificate is not None and not form.certificate:
         lost.append("certificate")
     lost += form.lost(surface, units)
-    if members and not form.members:
-        lost.append("members")
-    if cable_areas and not form.members:
-        lost.append("sections of cables")
+    model = {"members": members, "sections of cables": cable_areas}
+    lost += [what for what, given in model.items() if given and not form.members]
     surface = surface.cell if "images" in form.loses else surface
     if units and form.unit:
         surface = scaled_surface(surface, length_factor(units.length, form.unit))
@@ -121,15 +119,14 @@ def write(
         findings = {name: getattr(certificate, name) for name in findings.FILED}
     if findings:
         findings = {**findings, "mark": mark}
-    areas = cable_areas or {}
-    content = Content(metadata, carried, colour, findings, walls, units, bare, members, areas, mark)
+    about = metadata, carried, colour, findings, walls, units, bare, members, cable_areas or {}, mark
     for name in carried:
         if re.sub(r"\s+", "_", name) in form.reserved:
             text = f"{path}: scalars: {path.suffix} files use the name {name!r} themselves; rename the scalar"
             raise FileError(text, what=str(path), where=name, found=name)
     with writing(path), atomic_write(path) as temporary:
         try:
-            note = form.functions.write(temporary, shown, content)
+            note = form.functions.write(temporary, shown, Content(*about))
         except PcmcError as error:
             raise error.in_file(path, FileError, str(path)) from None
     if lost:

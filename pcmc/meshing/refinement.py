@@ -224,22 +224,19 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
     walls, rows, resting = part.walls, part.walls.rows, part.resting
     if not resting.any():
         return middle
-    own, of_held, of_wall = rows.vertices, walls.foot >= 0, resting | walls.top_free
-    top, direction, drop, down = X.copy(), np.zeros_like(X), np.zeros_like(X), resting.copy()
+    own, top, share, offset = rows.vertices, X.copy(), np.zeros((surface.n, 1)), np.zeros_like(X)
+    drop, down, of_wall = X - surface.plane.nearest(X), resting.copy(), resting | walls.top_free
     drop[walls.held] = X[walls.held] - X[walls.foot[walls.held]]
-    top[own], direction[own], drop[own] = rows.top_places(X), rows.directions(surface), rows.drops(X)
-    of_held[own], of_wall[own] = rows.feet[:, 0] >= 0, True
-    down[own] = under_low(rows, resting | walls.corner)
+    top[own], share[own, 0], drop[own] = (
+        rows.top_places(X),
+        1.0 - rows.relative_height,
+        rows.drops(surface, X),
+    )
+    offset[own], of_wall[own], down[own] = rows.offset, True, under_low(rows, resting | walls.corner)
     rising = of_wall[start] & of_wall[end] & (down[start] != down[end])
     rising &= ~(surface.fixed[start] & surface.fixed[end])
-    start, end = edges[rising].T
-    place = 0.5 * (top[start] + top[end])
-    height = surface.plane.height(place)[:, None]
-    on_sliding = place + 0.5 * height * (direction[start] + direction[end])
-    share = np.zeros(surface.n)
-    share[rows.vertices] = 1.0 - rows.relative_height
-    below = 0.25 * (share[start] + share[end])[:, None] * (drop[start] + drop[end])
-    middle[rising] = np.where(of_held[start, None], place - below, on_sliding)
+    top, share, offset, drop = (v[edges[rising]].mean(axis=1) for v in (top, share, offset, drop))
+    middle[rising] = top - share * drop + np.linalg.norm(drop, axis=1)[:, None] * offset
     return middle
 
 

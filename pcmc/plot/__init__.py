@@ -7,20 +7,5 @@ from .curves import convergence, diagram, heatmap, histories, lines
 from .pictures import draw, families, panel, panel_planarity, reactions, vectors
 from .uses import equilibria, member_forces, strains, under_load
 
-__all__ = [
-    "convergence",
-    "diagram",
-    "draw",
-    "equilibria",
-    "families",
-    "heatmap",
-    "histories",
-    "lines",
-    "member_forces",
-    "panel",
-    "panel_planarity",
-    "reactions",
-    "strains",
-    "under_load",
-    "vectors",
-]
+__all__ = ["convergence", "diagram", "draw", "equilibria", "families", "heatmap", "histories", "lines"]
+__all__ += ["member_forces", "panel", "panel_planarity", "reactions", "strains", "under_load", "vectors"]

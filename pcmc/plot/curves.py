@@ -68,15 +68,14 @@ def lines(
     for scale in (xscale, yscale):
         validate.choice("scale", scale, SCALES)
     figure, axes = new_axes(width, height, title, x, y, xscale, yscale)
-    for k, (label, (xs, ys)) in enumerate(curves.items()):
-        px, py = _curve(label, xs, ys, xscale, yscale)
-        color = CURVES[k % len(CURVES)]
-        turn = k // len(CURVES)  # how many times all colours are used already
-        plain = {"linewidth": 1.1, "linestyle": "" if label in (fits or {}) else ("-", "--")[turn % 2]}
+    fits = fits or {}
+    for k, (label, curve) in enumerate(curves.items()):
+        turn, color = k // len(CURVES), CURVES[k % len(CURVES)]  # how many times all colours are used already
+        plain = {"linewidth": 1.1, "linestyle": "" if label in fits else ("-", "--")[turn % 2]}
         look = overlap_style(k, len(curves)) if dashes else plain
-        marker = MARKERS[(k + turn) % len(MARKERS)] if markers else None
-        axes.plot(px, py, color=color, marker=marker, markersize=2.8, label=label, **look)
-        if fits and label in fits:
+        look |= {"color": color, "marker": MARKERS[(k + turn) % len(MARKERS)] if markers else None}
+        axes.plot(*_curve(label, *curve, xscale, yscale), markersize=2.8, label=label, **look)
+        if label in fits:
             axes.plot(*_curve(label, *fits[label], xscale, yscale), color=color, linewidth=1.1)
     for label, level in (levels or {}).items():
         axes.axhline(level, color=INK, linewidth=0.9, linestyle=(0, (5, 3)), label=label, zorder=1.5)
@@ -210,8 +209,14 @@ def heatmap(
     columns = min(columns, len(data))
     ratio = shape[0] / shape[1]
     figure = new(width, width * ratio * -(-len(data) // columns) / columns + 200.0, pad=6.0)
+    from matplotlib.colors import LogNorm, Normalize  # as ``new`` has found it installed
+
     panels, _ = grid(figure, len(data), columns)
-    norm = _norm(np.concatenate([v.ravel() for v in data.values()]), log, limits)
+    known = np.concatenate([table[np.isfinite(table)] for table in data.values()])
+    low, high = limits or ((known.min(), known.max()) if len(known) else (1.0, 10.0))
+    if not low < high:
+        low, high = (low / 2.0, low * 2.0) if log else (low - 0.5, low + 0.5)
+    norm = (LogNorm if log else Normalize)(low, high)
     grey_for_nan = color_map(cmap).with_extremes(bad="#D9D9D9")
     for k, (axes, (title, table)) in enumerate(zip(panels, data.items(), strict=True)):
         image = axes.imshow(table, origin="lower", cmap=grey_for_nan, norm=norm, aspect="auto")
@@ -260,10 +265,9 @@ def add_branches(axes: Any, branches: Mapping[str, Any], x: str, y: str) -> int:
                 message = f"branch {label!r}: {unknown('column', column, known)}"
                 raise OptionError(message, what="branches", where=label, found=column)
         color = CURVES[k % len(CURVES)]
-        named = label
-        for stable, piece in branch.pieces(x, y):
-            axes.plot(*piece.T, color=color, linewidth=1.1, linestyle="-" if stable else "--", label=named)
-            named = ""
+        for number, (stable, piece) in enumerate(branch.pieces(x, y)):
+            look = {"linewidth": 1.1, "linestyle": "-" if stable else "--", "label": "" if number else label}
+            axes.plot(*piece.T, color=color, **look)
         for kind, rows in branch.events.groupby("kind", sort=False):
             text = "" if kind in marked else MEANINGS[str(kind)]
             marked.add(str(kind))
@@ -338,13 +342,3 @@ def _tables(what: str, given: Mapping[str, npt.ArrayLike], shape: tuple[int, int
         if table.shape != shape:
             validate.refuse(what, table.shape, f"shape {shape}, (len(y), len(x))", where=title)
     return tables
-
-
-def _norm(values: Floats, log: bool, limits: tuple[float, float] | None) -> Any:
-    from matplotlib.colors import LogNorm, Normalize
-
-    known = values[np.isfinite(values)]
-    low, high = limits or ((known.min(), known.max()) if len(known) else (1.0, 10.0))
-    if not low < high:
-        low, high = (low / 2.0, low * 2.0) if log else (low - 0.5, low + 0.5)
-    return LogNorm(low, high) if log else Normalize(low, high)

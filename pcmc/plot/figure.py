@@ -38,8 +38,7 @@ def new(width: float, height: float, pad: float = 4.0) -> Any:
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    gap = pad / DPI
-    layout = ConstrainedLayoutEngine(w_pad=gap, h_pad=gap, wspace=0.0, hspace=0.0)
+    layout = ConstrainedLayoutEngine(w_pad=pad / DPI, h_pad=pad / DPI, wspace=0.0, hspace=0.0)
     figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white", layout=layout)
     FigureCanvasAgg(figure)
     return figure
@@ -100,21 +99,17 @@ class Frame:
 
 def frames_of(points: Sequence[Floats], columns: int, width: int, one_scale: bool = True) -> list[Frame]:
     """Frames around the given points (k,2), row by row; those of a row are of one height."""
-    lows = np.array([p.min(axis=0) for p in points])
-    spans = np.array([np.ptp(p, axis=0) for p in points])
-    wide = width // columns
+    spans, wide = np.array([np.ptp(p, axis=0) for p in points]), width // columns
     room = np.array([wide, TALLEST * wide]) - 2 * MARGIN
     scales = (room / np.maximum(spans, 1e-9 * spans.max())).min(axis=1)
     if one_scale:
         scales[:] = scales.min()
     frames = []
-    for start in range(0, len(points), columns):
-        row = range(start, min(start + columns, len(points)))
-        high = math.ceil(max(spans[k][1] * scales[k] for k in row) + 2 * MARGIN)
-        for k in row:
-            beside = (wide / scales[k] - spans[k][0]) / 2.0
-            low = lows[k] - np.array([beside, MARGIN / scales[k]])
-            frames.append(Frame((wide, high), low, float(scales[k])))
+    for k, (corners, span, scale) in enumerate(zip(points, spans, scales.tolist(), strict=True)):
+        row = slice(k - k % columns, k - k % columns + columns)
+        high = math.ceil((spans[row, 1] * scales[row]).max() + 2 * MARGIN)
+        low = corners.min(axis=0) - np.array([(wide / scale - span[0]) / 2.0, MARGIN / scale])
+        frames.append(Frame((wide, high), low, scale))
     return frames
 
 
@@ -151,9 +146,8 @@ def finish(figure: Any, path: Path | None) -> Image:
     image = np.ascontiguousarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
     if path is None:
         return image
-    suffix_of(path, SUFFIXES, "a picture")
-    kind, nobody = os.path.splitext(path)[1].lower(), {".svg": {"Date": None}}
-    nobody[".pdf"] = dict.fromkeys(("CreationDate", "Creator", "Producer"))
+    kind = suffix_of(path, SUFFIXES, "a picture")
+    nobody = dict.fromkeys(("Date",) if kind == ".svg" else ("CreationDate", "Creator", "Producer"))
     with writing(path), atomic_write(path) as temporary:
         if kind == ".png":
             temporary.write_bytes(png(image))
@@ -161,7 +155,7 @@ def finish(figure: Any, path: Path | None) -> Image:
         from matplotlib import rc_context
 
         with rc_context({"svg.hashsalt": "pcmc", "pdf.fonttype": 42}):
-            figure.savefig(temporary, format=kind[1:], metadata=nobody[kind], dpi=DPI)
+            figure.savefig(temporary, format=kind[1:], metadata=nobody, dpi=DPI)
     return image
 
 
@@ -252,10 +246,8 @@ def legend_entries(pictures: Iterable[Picture]) -> tuple[dict[str, Any], dict[st
                     colors.setdefault(patch.name, tuple(color))
         elif np.isnan(values[shown] if len(values) == surface.n else values).any():
             colors["no value"] = NO_VALUE
-        for name, held, dot in (
-            ("fixed", surface.pinned, FIXED_DOT),
-            ("sliding", surface.held & ~surface.pinned, SLIDING_DOT),
-        ):
+        sliding = surface.held & ~surface.pinned
+        for name, held, dot in (("fixed", surface.pinned, FIXED_DOT), ("sliding", sliding, SLIDING_DOT)):
             if dotted and held[shown].any() and _visible(image, rgb(dot), step=1):
                 dots[name] = dot
     return colors, dots

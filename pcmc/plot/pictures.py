@@ -187,9 +187,8 @@ def compose(
     images = []
     for k, drawing in enumerate(drawings):
         fill = None if colors is None or drawing.values is None else colors.rgb(drawing.values)
-        meshed = edge[k] >= EDGES_FROM if edges is None else edges
-        view, chosen = drawing.view, drawing.patches
-        painted = scene(drawing.surface, view, fill, supports=dotted[k], edges=meshed, patches=chosen)
+        look = {"supports": dotted[k], "edges": edge[k] >= EDGES_FROM if edges is None else edges}
+        painted = scene(drawing.surface, drawing.view, fill, patches=drawing.patches, **look)
         images.append(paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer))
     if legend:
         add_picture_legend(figure, list(zip(drawings, dotted, images, strict=True)))
@@ -240,12 +239,8 @@ def panel_planarity(net: PanelNet, path: Path | None = None, **options: Any) -> 
     """
     mesh, percent = net.mesh, 100.0 * net.panels["planarity"].to_numpy()
     look: dict[str, Any] = {"label": "distance of the diagonals over their length, %", "supports": False}
-    look |= {
-        "edges": False,
-        "limits": (0.0, max(FLAT_PERCENT, float(percent.max()))),
-        "cmap": "YlGnBu",
-    } | options
-    return draw(mesh, path, scalars=percent[mesh.patch_of_face], **look)
+    look |= {"edges": False, "limits": (0.0, max(FLAT_PERCENT, float(percent.max()))), "cmap": "YlGnBu"}
+    return draw(mesh, path, scalars=percent[mesh.patch_of_face], **look | options)
 
 
 def vectors(
@@ -276,10 +271,8 @@ def vectors(
     view, title, width, options : as in ``draw``; options are supports, edges, renderer.
     """
     seen, fields = view_of(surface, view), []
-    for what, values, unit, color in (
-        ("field", field, label, ARROW),
-        ("points", points, points_label, AT_POINTS),
-    ):
+    given = (("field", field, label, ARROW), ("points", points, points_label, AT_POINTS))
+    for what, values, unit, color in given:
         arrows = np.zeros((surface.n, 3)) if values is None else np.asarray(values, dtype=float)
         if arrows.shape != (surface.n, 3) or not np.isfinite(arrows).all():
             validate.refuse(what, arrows.shape, f"finite numbers of shape ({surface.n}, 3)")
@@ -348,8 +341,7 @@ def cell_html(value: Any) -> str:
     """
     text = f"<pre>{html.escape(repr(value))}</pre>"
     try:
-        surface = value if isinstance(value, Surface) else value.surface
-        image = draw(surface, width=CELL_WIDTH, legend=True)
+        image = draw(value if isinstance(value, Surface) else value.surface, width=CELL_WIDTH, legend=True)
     except MissingExtra:
         return text
     return f'<img alt="surface" src="data:image/png;base64,{b64encode(png(image)).decode()}">{text}'

@@ -136,16 +136,15 @@ def scene(
     if values is None:
         colors = patch_colors(surface)[surface.patch_of_face[shown]][:, None] * light[..., None]
     else:
-        of_vertices = len(values) == surface.n
         known = np.where(np.isnan(values), rgb(NO_VALUE), values)
-        if of_vertices and len(F) <= CELLS_UP_TO:
+        if len(values) != surface.n:
+            colors = known[shown][:, None] * light[..., None]
+        elif len(F) <= CELLS_UP_TO:
             P, colors = _cells(P, known[F], light)
-        else:
-            base = known[shown] if not of_vertices else rgb(NO_VALUE)
-            if of_vertices:  # the mean of the corners' colours that exist
-                there = ~np.isnan(values[F][..., :1])
-                count, total = there.sum(axis=1), np.where(there, values[F], 0.0).sum(axis=1)
-                base = np.where(count > 0, total / np.maximum(count, 1), base)
+        else:  # the mean of the corners' colours that exist
+            there = ~np.isnan(values[F][..., :1])
+            count, total = there.sum(axis=1), np.where(there, values[F], 0.0).sum(axis=1)
+            base = np.where(count > 0, total / np.maximum(count, 1), rgb(NO_VALUE))
             colors = base[:, None] * light[..., None]
     there = np.zeros(len(topo.edges), dtype=bool)
     there[topo.edge_of_face[shown]] = True
@@ -230,10 +229,8 @@ def paint(scene: Scene, low: Floats, scale: float, size: tuple[int, int], render
     from PIL import Image as Pillow
 
     validate.choice("renderer", renderer, RENDERERS)
-    many = len(scene.corners) > MANY
-    painter = _with_matplotlib
-    if renderer == "pyvista" or (renderer == "auto" and many and opengl()):
-        painter = _with_pyvista
+    fast = renderer == "pyvista" or (renderer == "auto" and len(scene.corners) > MANY and opengl())
+    painter = _with_pyvista if fast else _with_matplotlib
     fine = Pillow.fromarray(np.ascontiguousarray(painter(scene, low, scale, size)))
     return np.asarray(fine.reduce(SAMPLES))
 
@@ -248,8 +245,7 @@ def opengl() -> bool:
         "w = vtkRenderWindow(); w.SetOffScreenRendering(1); w.SetSize(8, 8)\n"
         "w.AddRenderer(vtkRenderer()); w.Render()\n"
     )
-    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, check=False)
-    return done.returncode == 0
+    return not subprocess.run([sys.executable, "-c", probe], capture_output=True, check=False).returncode
 
 
 def _with_pyvista(scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> Floats:
@@ -273,18 +269,13 @@ def _with_pyvista(scene: Scene, low: Floats, scale: float, size: tuple[int, int]
             dots["rgb"] = np.round(scene.dot_colors * 255.0).astype(np.uint8)
             round_dots = {"style": "points", "render_points_as_spheres": True, "point_size": SAMPLES * DOT}
             plotter.add_mesh(dots, **plain, **round_dots)
-        axes, depth = scene.view.axes, scene.view.depth(scene.corners.reshape(-1, 3))
-        centre = low + np.array(size) / (2.0 * scale)
-        near, far = depth.max(), depth.min()
-        reach = max(near - far, np.array(size).max() / scale)
-        focus = centre @ axes[:2] + near * axes[2]
-        camera = plotter.camera
-        camera.position = focus + reach * axes[2]
-        camera.focal_point = focus
-        camera.up = axes[1]
-        camera.parallel_projection = True
-        camera.parallel_scale = size[1] / (2.0 * scale)
-        camera.clipping_range = (0.5 * reach, reach + (near - far) + 0.5 * reach)
+        (right, up, towards), depth = scene.view.axes, scene.view.depth(scene.corners.reshape(-1, 3))
+        thick, reach = np.ptp(depth), max(np.ptp(depth), max(size) / scale)
+        (across, high), camera = low + np.array(size) / (2.0 * scale), plotter.camera
+        focus = across * right + high * up + depth.max() * towards
+        camera.position, camera.focal_point, camera.up = focus + reach * towards, focus, up
+        camera.parallel_projection, camera.parallel_scale = True, size[1] / (2.0 * scale)
+        camera.clipping_range = (0.5 * reach, 1.5 * reach + thick)
         image = plotter.screenshot(return_img=True)
         plotter.close()
     return image[..., :3]
@@ -300,15 +291,12 @@ def _with_matplotlib(scene: Scene, low: Floats, scale: float, size: tuple[int, i
     disc = np.stack([np.cos(circle), np.sin(circle)], axis=1) * DOT / (2.0 * scale)
     shapes = [*project(scene.corners), *project(scene.segments), *(project(scene.dots)[:, None] + disc)]
     fills = np.concatenate([scene.colors.mean(axis=1), scene.shades, scene.dot_colors])
-    thin = np.full(len(scene.corners), 0.4)
-    widths = np.concatenate([thin, scene.widths, np.zeros(len(scene.dots))])
-    order = scene.order
+    widths = np.concatenate([np.full(len(scene.corners), 0.4), scene.widths, np.zeros(len(scene.dots))])
+    order, (right, top) = scene.order, low + np.array(size) / scale
     figure = Figure(figsize=(size[0] / 72.0, size[1] / 72.0), dpi=72.0 * SAMPLES)
-    canvas = FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    canvas, axes = FigureCanvasAgg(figure), figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
-    axes.set_xlim(low[0], low[0] + size[0] / scale)
-    axes.set_ylim(low[1], low[1] + size[1] / scale)
+    axes.set(xlim=(low[0], right), ylim=(low[1], top))
     painted, fills = [shapes[k] for k in order], fills[order]
     look: dict[str, Any] = {"linewidths": widths[order], "joinstyle": "round"}
     axes.add_collection(PolyCollection(painted, facecolors=fills, edgecolors=fills, **look))

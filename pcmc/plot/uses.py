@@ -36,10 +36,9 @@ def strains(pattern: CuttingPattern, path: Path | None = None, **options: Any) -
     first = np.cumsum([0, *(len(strip.roof) for strip in strips)])
     faces = np.concatenate([strip.faces + start for strip, start in zip(strips, first[:-1], strict=True)])
     owner = np.repeat(np.arange(len(strips)), [len(strip.faces) for strip in strips])
-    patches = [Patch(f"strip {strip.number}", 1.0) for strip in strips]
+    patches = tuple(Patch(f"strip {strip.number}", 1.0) for strip in strips)
     roof = np.concatenate([strip.roof for strip in strips])
-    held: dict[str, Any] = {"fixed": range(len(roof)), "plane": pattern.surface.plane}
-    cut = Surface(roof, faces, owner, tuple(patches), **held)
+    cut = Surface(roof, faces, owner, patches, np.ones(len(roof), dtype=bool), plane=pattern.surface.plane)
     strain = np.concatenate([strip.strain for strip in strips])
     largest = 100.0 * np.take_along_axis(strain, np.abs(strain).argmax(axis=1)[:, None], axis=1)[:, 0]
     look: dict[str, Any] = {"label": "strain of the cloth, %", "supports": False, "edges": False} | options

@@ -199,7 +199,7 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
         label, more = starts[0].label, " and others" * (len(starts) > 1)
         notes.append(f"{label}{more}: the value given is where the search begins; the targets decide it")
     if project.has_file:  # a drawing alone is proposed as a whole
-        notes = [*chosen_values(project.plan, project.chosen.text, surface), *notes]
+        notes = [*chosen_values(project.plan, project.chosen.text, given.surface, surface), *notes]
     if project.drawing is not None or start.data is not None:
         notes += metres_note(project.output.files, start.units.length)
     if project.output.whole and any(target.quantity in EXTENSIVE for target in project.targets):

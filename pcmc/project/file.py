@@ -110,6 +110,17 @@ class Project:
         """The command that writes the project of a drawing."""
         return f"pcmc plan {self.path} -o {self.path.with_suffix(TOML)}"
 
+    def solved_by(self, method: str) -> Project:
+        """The same project with another method; a warning names the options that it leaves out."""
+        if method == self.method:
+            return self
+        find_method(method)
+        if self.options:
+            left = ", ".join(f"{name} = {value}" for name, value in self.options.items())
+            text = f"{self.path}: method {method} solves without the file's options of {self.method}: {left}"
+            warnings.warn(text, FileWarning, stacklevel=2)
+        return replace(self, method=method, options={})
+
     def in_folder(self, folder: PathLike) -> Project:
         """The same project with its output in a folder; FileError for output that a link leads out of it."""
         base = Path(folder)

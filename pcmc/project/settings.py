@@ -20,10 +20,8 @@ from ..base.units import LENGTHS, Units, expect_length
 from ..cloth.settings import CuttingOptions
 from ..cloth.sheets import SUFFIXES as PATTERNS
 from ..cloth.sheets import TABLES as PATTERN_TABLES
+from ..drawings.drawing_set import NET_SUFFIXES, NET_TABLES, table_paths
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
-from ..drawings.drawing_set import table_paths
-from ..drawings.net_drawings import SUFFIXES as NETS
-from ..drawings.net_drawings import TABLES as NET_TABLES
 from ..drawings.sheet import FORMATS
 from ..meshing.remeshing import check_lengths, remesh, size_note
 from ..panelling.panel_net import PATTERNS as NET_PATTERNS
@@ -42,7 +40,7 @@ CSV, INP = ".csv", ".inp"
 SAME_WARP = 1.0  # degree: directions of [pattern] and [structure] that differ by less are one
 DOCUMENTS = {  # keys of files for those who build, with their suffixes and what they are
     "drawings": (DRAWINGS, "a drawing"),
-    "net": (NETS, "a net of panels"),
+    "net": (NET_SUFFIXES, "a net of panels"),
     "panels": ((CSV,), "a schedule of panels"),
     "structure": ((INP,), "a structural model"),
     "pattern": (PATTERNS, "a cutting pattern"),

@@ -20,7 +20,7 @@ from ..base.interrupts import defer_interrupts
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..cloth.sheets import pattern_files
-from ..drawings.net_drawings import net_files
+from ..drawings.drawing_set import net_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
 from ..structure import Analysis, StructuralModel, write_structure

@@ -209,8 +209,8 @@ class Stepper:
         now, then = self.state.at.space, second.of.space
         if now is then:
             return action(z)
-        out = action(np.append(then.from_other(now, z[: now.size]), z[now.size :]))
-        return np.append(now.from_other(then, out[: now.size]), out[now.size :])
+        out = action(np.append(then.to_coordinates(now.to_vectors(z[: now.size])), z[now.size :]))
+        return np.append(now.to_coordinates(then.to_vectors(out[: now.size])), out[now.size :])
 
     def direction(self, second: SecondVariation) -> tuple[Floats, Floats, int]:
         """-B J⁻¹ r (n,3), the changes (r,) of the rooms' pressures, and the steps that GMRES took.

@@ -14,6 +14,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from ..base.arrays import Floats
 from .factorisation import TINY, Factor, Inverse, SingularMatrix
 
+Times = Callable[[Floats], Floats]
 CLOSE = 1e-12  # cosine of Q and A⁻¹Q: below, rounding may have chosen its sign
 
 
@@ -61,27 +62,15 @@ class AcrossFactor:
 
 
 def solve_preconditioned(
-    times: Callable[[Floats], Floats],
-    inverse: Callable[[Floats], Floats],
-    right: Floats,
-    accuracy: float,
-    *,
-    restart: int,
-    cycles: int = 1,
+    times: Times, inverse: Times, right: Floats, accuracy: float, *, restart: int, cycles: int = 1
 ) -> tuple[Floats, list[float]]:
     """z with ``times(z)`` = right (N,) to a relative accuracy, by GMRES, and the residual after each step:
     that of ``inverse(times(z))``, over the norm of ``right``."""
     residuals: list[float] = []
-    shape = len(right), len(right)
+    A, M = (LinearOperator(2 * right.shape, each, dtype=float) for each in (times, inverse))
+    note = residuals.append
     z, _ = gmres(
-        LinearOperator(shape, times, dtype=float),
-        right,
-        M=LinearOperator(shape, inverse, dtype=float),
-        rtol=accuracy,
-        restart=restart,
-        maxiter=cycles,
-        callback=residuals.append,
-        callback_type="pr_norm",
+        A, right, M=M, rtol=accuracy, restart=restart, maxiter=cycles, callback=note, callback_type="pr_norm"
     )
     return z, residuals
 

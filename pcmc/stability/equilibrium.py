@@ -6,6 +6,7 @@ volumes V̄, their pressures are unknowns, too, and V = V̄. A = Bᵀ(∂²E)B i
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,7 +16,7 @@ from scipy.sparse import csr_array
 
 from ..base.arrays import Floats, read_only
 from ..forces.functional import energy_and_gradient
-from ..forces.jacobian import Linearisation, linearise
+from ..forces.jacobian import linearise
 from ..forces.loose_parts import relative_forces
 from ..forces.motion_space import MotionSpace, VertexClasses, force_scale, motion_space
 from ..forces.pattern import Pattern, hessian_pattern
@@ -148,8 +149,8 @@ class Equilibrium:
         return excess_pull(self.shape, self.part.walls, self.part.resting, -self.gradient_with_reactions)
 
     @cached_property
-    def jacobian(self) -> Linearisation:
-        """J, the derivative of r along motions of the vertices; B turns along with the surface."""
+    def jacobian(self) -> Callable[[Floats], Floats]:
+        """d ↦ J d, the derivative of r along motions of the vertices; B turns along with the surface."""
         gradient = self.gradient
         if len(self.carried[1]):
             gradient = gradient - rigid_field(self._placing, self.X)
@@ -194,7 +195,7 @@ class Equilibrium:
         [ J   -C ] [ s ]
         [ Cᵀ   0 ] [ μ ]        C = Bᵀ ∂V/∂X in units of force
         """
-        change = self.jacobian.times(d)
+        change = self.jacobian(d)
         if len(self.carried[1]):  # r = Bᵀ(∇E - the field of ``_placing``), whose arms move along
             turned = self.space.to_coordinates(np.cross(self._placing[1], d))
             change = self.across_carried(change - turned)
@@ -306,14 +307,16 @@ class Equilibrium:
         length = np.linalg.norm(self.volume_columns, axis=0)
         return np.hstack([self.rigid, self.volume_columns[:, length > 0.0] / length[length > 0.0]])
 
-    def matrix(self, hessian: float = 1.0, stiffness: float = 0.0) -> Floats:
+    def matrix(self, hessian: float, stiffness: float) -> Floats:
         """Values of hessian · A + stiffness · BᵀLB in the pattern."""
+        if (hessian, stiffness) == (1.0, 0.0):
+            return self._plain_matrix
         pattern = self.unknowns[0]
         return assemble(self.surface, self.classes, self.space, pattern, self.X, hessian, stiffness)
 
     @cached_property
     def _plain_matrix(self) -> Floats:
-        return self.matrix()
+        return assemble(self.surface, self.classes, self.space, self.unknowns[0], self.X)
 
     def factorised(
         self, shift: Floats | float = 0.0, stiffness: float = 0.0, soften: bool = True
@@ -325,8 +328,7 @@ class Equilibrium:
         """
         pattern, solver = self.unknowns
         for added in (0.0, SOFT) if soften else (0.0,):
-            plain = stiffness + added == 0.0
-            data = self._plain_matrix if plain else self.matrix(1.0, stiffness + added)
+            data = self.matrix(1.0, stiffness + added)
             if np.ndim(shift) or shift:
                 data = data.copy()
                 data[pattern.indptr[:-1]] -= shift
@@ -356,9 +358,7 @@ class SecondVariation:
     @cached_property
     def matrix(self) -> csr_array:
         """(N,N) sparse symmetric A, without the shift, with what was added."""
-        more = self.stiffness + self.added
-        data = self.of._plain_matrix if more == 0.0 else self.of.matrix(1.0, more)
-        return self.pattern.symmetric(data)
+        return self.pattern.symmetric(self.of.matrix(1.0, self.stiffness + self.added))
 
     @cached_property
     def added_matrix(self) -> csr_array | None:
@@ -375,9 +375,6 @@ class SecondVariation:
         return BorderedFactor(inner, -columns, columns.T)
 
     @cached_property
-    def _across_excluded(self) -> Inverse:
-        return AcrossFactor.of(self.factor, self.of.excluded)
-
-    def solve(self, right: Floats) -> Floats:
-        """The inverse (N,) among the motions that count: with none of the excluded ones."""
-        return self._across_excluded.solve(right)
+    def solve(self) -> Callable[[Floats], Floats]:
+        """The inverse of A among the motions that count: with none of the excluded ones."""
+        return AcrossFactor.of(self.factor, self.of.excluded).solve

@@ -13,13 +13,13 @@ import os
 import re
 import threading
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
@@ -33,12 +33,7 @@ from ..forces.pattern import Pattern
 from .diagonal_pivots import ZERO, SingularMatrix, count_negative
 
 __all__ = ("BACKENDS", "Factor", "Factoriser", "Inverse", "SingularMatrix", "factoriser", "installed")
-Ordering = Literal["MMD_AT_PLUS_A", "NATURAL"]
 BACKENDS = ("pardiso", "superlu")
-OUTDATED = (
-    "this factorisation is out of date: its factoriser has made another one since; factorise its matrix"
-    " again, or use a factoriser for each"
-)
 TINY = float(np.finfo(float).tiny)
 ONE_THREAD = 10_000  # rows; up to here MKL is fastest with one thread
 
@@ -61,12 +56,18 @@ class Inverse(Protocol):
         """A⁻¹ right, for one right-hand side (N,) or several (N,k)."""
 
 
-class Factor(Inverse, Protocol):
-    """A factorised matrix."""
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """A factorised matrix, an ``Inverse``."""
 
-    @property
+    solve: Callable[[Floats], Floats]
+    count: Callable[[], int]
+    lu: Any = None  # SuperLU's factors, if it made them
+
+    @cached_property
     def negative(self) -> int:
         """Number of negative eigenvalues (Sylvester: negative pivots of D in L D Lᵀ)."""
+        return self.count()
 
 
 class Factoriser(Protocol):
@@ -106,22 +107,6 @@ def factoriser(pattern: Pattern, backend: str | None = None, units: Floats | Non
     return plain if units is None else _Scaled(plain, pattern, units)
 
 
-@dataclass(frozen=True, eq=False)
-class _ScaledFactor:
-    """Of A, from one of U A U."""
-
-    plain: Factor
-    units: Floats
-
-    @property
-    def negative(self) -> int:
-        return self.plain.negative
-
-    def solve(self, right: Floats) -> Floats:
-        units = self.units if right.ndim == 1 else self.units[:, None]
-        return units * self.plain.solve(units * right)
-
-
 class _Scaled:
     """Factorises U A U."""
 
@@ -130,7 +115,13 @@ class _Scaled:
         self._products = np.repeat(units, np.diff(pattern.indptr)) * units[pattern.indices]
 
     def factor(self, data: Floats) -> Factor:
-        return _ScaledFactor(self._plain.factor(self._products * data), self._units)
+        plain = self._plain.factor(self._products * data)
+
+        def solve(right: Floats) -> Floats:
+            units = self._units if right.ndim == 1 else self._units[:, None]
+            return units * plain.solve(units * right)
+
+        return Factor(solve, lambda: plain.negative)
 
 
 def _finite(data: Floats) -> None:
@@ -146,13 +137,8 @@ class _SuperLU:
     """
 
     def __init__(self, pattern: Pattern) -> None:
-        entry = np.arange(1, len(pattern.indices) + 1)
-        upper = csr_array((entry, pattern.indices, pattern.indptr), shape=(pattern.size, pattern.size))
-        rows = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr))
-        off = rows != pattern.indices
-        lower = csr_array((entry[off], (pattern.indices[off], rows[off])), shape=upper.shape)
-        self._full = csr_array(upper + lower)
-        self._ordering: Ordering = "MMD_AT_PLUS_A"
+        self._full = pattern.symmetric(np.arange(1.0, 1 + len(pattern.indices)))
+        self._ordering = "MMD_AT_PLUS_A"
         empty = np.empty(0, dtype=np.int32)
         self._arrange(reverse_cuthill_mckee(self._full, symmetric_mode=True) if pattern.size else empty)
 
@@ -160,7 +146,7 @@ class _SuperLU:
         arranged = csc_array(self._full[order][:, order])
         arranged.sort_indices()
         self._order = order
-        self._source: Ints = arranged.data - 1
+        self._source = arranged.data.astype(np.int64) - 1
         self._indices, self._indptr = arranged.indices, arranged.indptr
 
     def factor(self, data: Floats) -> Factor:
@@ -170,33 +156,23 @@ class _SuperLU:
             lu = _superlu(matrix, self._ordering)
         except RuntimeError as error:
             raise SingularMatrix(str(error)) from None
-        factor = _SuperLUFactor(matrix, lu, self._order)
+        order = self._order
         if self._ordering != "NATURAL":
             self._ordering = "NATURAL"
-            self._arrange(self._order[np.argsort(lu.perm_c)])
-        return factor
+            self._arrange(order[np.argsort(lu.perm_c)])
+
+        def solve(right: Floats) -> Floats:
+            right = right[order]
+            first = lu.solve(right)
+            out = np.empty_like(first)
+            out[order] = first + lu.solve(right - matrix @ first)
+            return out
+
+        return Factor(solve, lambda: count_negative(matrix, lu, _superlu), lu)
 
 
-def _superlu(matrix: csc_array, ordering: Ordering = "MMD_AT_PLUS_A") -> Any:
+def _superlu(matrix: csc_array, ordering: Any = "MMD_AT_PLUS_A") -> Any:
     return splu(matrix, ordering, 0.0, panel_size=4, options={"SymmetricMode": True})
-
-
-@dataclass(frozen=True, eq=False)
-class _SuperLUFactor:
-    matrix: csc_array
-    lu: Any
-    order: Ints
-
-    @cached_property
-    def negative(self) -> int:
-        return count_negative(self.matrix, self.lu, _superlu)
-
-    def solve(self, right: Floats) -> Floats:
-        right = right[self.order]
-        first = self.lu.solve(right)
-        out = np.empty_like(first)
-        out[self.order] = first + self.lu.solve(right - self.matrix @ first)
-        return out
 
 
 class _Pardiso:
@@ -228,23 +204,27 @@ class _Pardiso:
         made = self._made
         try:
             if not self._analysed:
-                self.run(11, matrix, nothing)
+                self._run(11, matrix, nothing)
                 self._analysed = True
                 # the factor is memory of MKL's: freed with this object, not at exit
                 weakref.finalize(self, _release, self._solver, self._pattern).atexit = False
-            self.run(22, matrix, nothing)
+            self._run(22, matrix, nothing)
         except self._error as error:
             raise SingularMatrix(str(error)) from None
         iparm = self._solver.iparm
         if iparm[13]:  # the number of pivots that MKL has replaced
             raise SingularMatrix(f"{iparm[13]} pivots are zero to rounding")
-        return _PardisoFactor(self, matrix, unit, int(iparm[22]), made)
+        negative = int(iparm[22])
+        return Factor(
+            lambda right: self._run(33, matrix, np.asfortranarray(unit * right), made), lambda: negative
+        )
 
-    def run(self, phase: int, matrix: csr_array, right: Floats, made: int | None = None) -> Floats:
+    def _run(self, phase: int, matrix: csr_array, right: Floats, made: int | None = None) -> Floats:
         """A phase of MKL's; where it uses a factor, the ``made``-th one."""
         with self._lock, self._threads():
             if made not in (None, self._made):
-                raise PcmcError(OUTDATED)
+                text = "this factorisation is out of date: its factoriser has made another one since;"
+                raise PcmcError(f"{text} factorise its matrix again, or use a factoriser for each")
             self._solver.set_phase(phase)
             return self._solver._call_pardiso(matrix, right)
 
@@ -274,15 +254,3 @@ def _mkl_path() -> str:
 def _release(solver: Any, pattern: Pattern) -> None:
     solver.set_phase(-1)
     solver._call_pardiso(pattern.matrix(np.zeros(len(pattern.indices))), np.zeros((pattern.size, 1)))
-
-
-@dataclass(frozen=True, eq=False)
-class _PardisoFactor:
-    owner: _Pardiso
-    matrix: csr_array
-    unit: float
-    negative: int
-    made: int
-
-    def solve(self, right: Floats) -> Floats:
-        return self.owner.run(33, self.matrix, np.asfortranarray(self.unit * right), self.made)

@@ -103,18 +103,6 @@ def descent_mode(surface: Surface) -> tuple[int, Floats]:
     return system.negative, lowest(system, 1)[1][0]
 
 
-def _dense(system: SecondVariation, k: int) -> tuple[Floats, Floats]:
-    """The k lowest eigenvalues, ascending, and their modes (N,k) of unit mass; for a few unknowns."""
-    across = np.eye(len(system.of.mass))
-    if system.of.excluded.shape[1]:
-        across = null_space(system.of.excluded.T)
-    if not across.shape[1]:
-        return np.empty(0), across
-    H, M = system.matrix.toarray(), np.diag(system.of.mass)
-    values, vectors = eigh(across.T @ H @ across, across.T @ M @ across)
-    return values[:k], across @ vectors[:, :k]
-
-
 def lowest(system: SecondVariation, count: int) -> tuple[Floats, Floats]:
     """The ``count`` eigenvalues (k,) nearest zero, ascending, and their modes (k,n,3).
 
@@ -125,7 +113,14 @@ def lowest(system: SecondVariation, count: int) -> tuple[Floats, Floats]:
     size, root = len(system.of.mass), np.sqrt(system.of.mass)
     k = max(count + 1, system.negative + 2)
     while True:
-        values, vectors = _dense(system, k) if max(2 * k, DENSE) >= size else _nearest(system, k)
+        if max(2 * k, DENSE) < size:
+            values, vectors = _nearest(system, k)
+        else:
+            excluded = system.of.excluded
+            across = null_space(excluded.T) if excluded.shape[1] else np.eye(size)
+            H, M = (across.T @ each @ across for each in (system.matrix.toarray(), np.diag(root**2)))
+            values, vectors = eigh(H, M) if across.shape[1] else (np.empty(0), H)
+            values, vectors = values[:k], across @ vectors[:, :k]
         # one more than are wanted, and all negative ones: these may be farther from zero than positive ones
         rounding = SAME_EIGENVALUE * np.abs(values).max(initial=0.0)
         whole = len(values) <= count or values[-1] - values[count - 1] > rounding

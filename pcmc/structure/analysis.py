@@ -21,7 +21,7 @@ from ..surface.pieces import point_text
 from .calculix import CalculixError, expect_program, run_as_far
 from .columns import column_table, column_text
 from .gas import balanced_pressure
-from .loads import FORM, Step
+from .loads import FORM, Step, nothing
 from .member_forces import (
     MemberForces,
     cable_notes,
@@ -319,7 +319,14 @@ def analyse_step(
         return _case_of(model, step.name, run_as_far(model, [form, *before, step], timeout), len(before) + 2)
     standing, outside = model.standing, gas.outside(model.units)
     first, volume = gas.pressure(standing), gas.enclosed(standing)
-    filled = first * model.combinations.get(step.name, {}).get(FORM, 1.0)
+    factor = model.combinations.get(step.name, {}).get(FORM, 1.0)
+    filled = factor * first
+    if factor != 1.0:  # the roof moves while it is filled
+        more = nothing(form).plus(form, nothing(form), factor)
+        filling = _case_of(model, step.name, run_as_far(model, [form, more], timeout), 2, filled)
+        if not filling.carried:
+            return filling
+        volume = filling.volume
     wanted = [(other, first) for other in before] + [(step, filled)]
     signs = gas.signs(standing)[standing.patch_of_face]
 

@@ -63,6 +63,11 @@ class _Placed:
         parallel = np.linalg.norm(np.cross(self._axis, other._axis)) <= PARALLEL
         return bool(parallel and self._apart(other) <= near)
 
+    def lies_in(self, plane: Plane) -> bool:
+        """Whether a line or circle through a point of the plane stays in it."""
+        turned = np.cross if isinstance(self, Circle) else np.dot
+        return bool(np.linalg.norm(turned(self._axis, plane._axis)) <= PARALLEL)
+
     def _apart(self, other: Any) -> float:
         return float(np.abs(self.distance(other._origin)))
 

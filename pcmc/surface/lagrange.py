@@ -187,12 +187,31 @@ def middles_of_sides(X: Floats, nodes: Ints, order: int) -> Floats:
 
 @cache
 def shapes(order: int) -> Shapes:
-    """The shape functions at points that integrate (x, x_ξ × x_η) exactly.
+    """The shape functions at points that integrate (x, x_ξ × x_η) exactly, of degree 3p - 2.
+
+    Up to order 2 the rules of degree 1 and 5 that treat the corners alike (Radon 1948); above, Gauss's in ξ
+    and in η/(1 - ξ), with Jacobi's weight (Stroud 1971).
 
     >>> [len(shapes(order).weight) for order in ORDERS]
     [1, 7, 36, 144]
     """
-    points, weight = _quadrature(order)
+    if order == 1:
+        points, weight = np.full((1, 3), 1.0 / 3.0), np.array([0.5])
+    elif order == 2:
+        root = np.sqrt(15.0)
+        inner, outer = (6.0 - root) / 21.0, (6.0 + root) / 21.0
+        rings = [np.full((3, 3), near) + (1.0 - 3.0 * near) * np.eye(3) for near in (inner, outer)]
+        points = np.concatenate([np.full((1, 3), 1.0 / 3.0), *rings])
+        weight = np.repeat([270.0, 155.0 - root, 155.0 + root], [1, 3, 3]) / 2400.0
+    else:
+        from scipy.special import roots_jacobi, roots_legendre  # they take long to import
+
+        count = ceil((3 * order - 1) / 2)
+        (s, s_weight), (t, t_weight) = roots_jacobi(count, 1, 0), roots_legendre(count)
+        xi, share = np.meshgrid(0.5 * (1.0 + s), 0.5 * (1.0 + t), indexing="ij")
+        eta = (1.0 - xi) * share
+        points = np.stack([1.0 - xi - eta, xi, eta], axis=-1).reshape(-1, 3)
+        weight = np.outer(s_weight, t_weight).ravel() / 8.0
     return Shapes(*(read_only(np.ascontiguousarray(a)) for a in (*shape_functions(order, points), weight)))
 
 
@@ -213,27 +232,3 @@ def shape_functions(order: int, points: Floats) -> tuple[Floats, Floats, Floats]
     turns = np.stack([slope[power[:, c], :, c] for c in range(3)])
     by = [turns[c] * parts[c - 1] * parts[c - 2] for c in range(3)]
     return parts.prod(axis=0).T, (by[1] - by[0]).T, (by[2] - by[0]).T
-
-
-def _quadrature(order: int) -> tuple[Floats, Floats]:
-    """Barycentric points (q,3) and weights (q,), exact for the degree 3p - 2 of volumes.
-
-    Up to order 2 the rules of degree 1 and 5 that treat the corners alike (Radon 1948); above, Gauss's in ξ
-    and in η/(1 - ξ), with Jacobi's weight (Stroud 1971).
-    """
-    if order == 1:
-        return np.full((1, 3), 1.0 / 3.0), np.array([0.5])
-    if order == 2:
-        root = np.sqrt(15.0)
-        inner, outer = (6.0 - root) / 21.0, (6.0 + root) / 21.0
-        rings = [np.full((3, 3), near) + (1.0 - 3.0 * near) * np.eye(3) for near in (inner, outer)]
-        weights = np.repeat([270.0, 155.0 - root, 155.0 + root], [1, 3, 3]) / 2400.0
-        return np.concatenate([np.full((1, 3), 1.0 / 3.0), *rings]), weights
-    from scipy.special import roots_jacobi, roots_legendre  # they take long to import
-
-    count = ceil((3 * order - 1) / 2)
-    (s, s_weight), (t, t_weight) = roots_jacobi(count, 1, 0), roots_legendre(count)
-    xi, share = np.meshgrid(0.5 * (1.0 + s), 0.5 * (1.0 + t), indexing="ij")
-    eta = (1.0 - xi) * share
-    points = np.stack([1.0 - xi - eta, xi, eta], axis=-1).reshape(-1, 3)
-    return points, np.outer(s_weight, t_weight).ravel() / 8.0

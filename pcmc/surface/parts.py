@@ -23,6 +23,20 @@ Part = TypeVar("Part")
 NAMED = 6  # patches, cables or rooms that a summary names
 
 
+def _check_loads(part: Patch | Cable, hint: str, *keys: str) -> None:
+    """Make floats of the tension, with its own ``hint``, and the loads ``keys``, which floats must hold."""
+    error, where, most = SurfaceError, part.name, checks.LARGEST
+    for key in ("tension", *keys):
+        least, why = (0.0, hint) if key == "tension" else (None, "")
+        number = validate.number(key, getattr(part, key), least=least, where=where, hint=why, error=error)
+        why = "use a larger unit of force"
+        validate.number(key, number, least=-most, most=most, where=where, hint=why, error=error)
+        if 0.0 < abs(number) < checks.SMALLEST:
+            bound = f"≥ {checks.SMALLEST:g}" if number > 0.0 else f"≤ {-checks.SMALLEST:g}"
+            validate.refuse(key, number, f"0 or {bound}", where, "use a smaller unit of force", error)
+        object.__setattr__(part, key, number)
+
+
 @dataclass(frozen=True)
 class Patch:
     """A part of the surface with one tension and one pressure.
@@ -57,27 +71,14 @@ class Patch:
         if not isinstance(self.wall, bool | np.bool_):
             validate.refuse("wall", self.wall, "True or False", self.name, error=SurfaceError)
         object.__setattr__(self, "wall", bool(self.wall))
-        tension = self._number("tension", least=0.0, hint="only a wall may have 0")
-        pressure, weight, snow = map(self._number, ("pressure", "weight", "snow"))
-        if tension == 0.0 and pressure != 0.0:
-            hint = f"a patch under pressure {pressure:g} must pull; a wall (pressure=0) may have tension 0"
-            validate.refuse("tension", 0.0, "> 0", self.name, hint, SurfaceError)
-        if tension == 0.0 and (weight != 0.0 or snow != 0.0):
-            bears = "carries snow" if snow else "weighs something"
+        _check_loads(self, "only a wall may have 0", "pressure", "weight", "snow")
+        if self.tension == 0.0 and (self.pressure or self.weight or self.snow):
+            bears = "carries snow" if self.snow else "weighs something"
             hint = f"a patch that {bears} must pull; give it a tension"
+            if self.pressure:
+                hint = f"a patch under pressure {self.pressure:g} must pull; a wall (pressure=0) may have"
+                hint += " tension 0"
             validate.refuse("tension", 0.0, "> 0", self.name, hint, SurfaceError)
-
-    def _number(self, key: str, least: float | None = None, hint: str = "") -> float:
-        value, where, most = getattr(self, key), self.name, checks.LARGEST
-        number = validate.number(key, value, least=least, where=where, hint=hint, error=SurfaceError)
-        hint = "use a larger unit of force"
-        validate.number(key, number, least=-most, most=most, where=where, hint=hint, error=SurfaceError)
-        if 0.0 < abs(number) < checks.SMALLEST:
-            bound = f"≥ {checks.SMALLEST:g}" if number > 0.0 else f"≤ {-checks.SMALLEST:g}"
-            hint = "use a smaller unit of force"
-            validate.refuse(key, number, f"0 or {bound}", where, hint, SurfaceError)
-        object.__setattr__(self, key, number)
-        return number
 
     @property
     def auxiliary(self) -> bool:
@@ -119,10 +120,7 @@ class Cable:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", checked_name("Cable.name", self.name, error=SurfaceError))
-        for key, least in (("tension", 0.0), ("weight", -checks.LARGEST)):
-            value, most = getattr(self, key), checks.LARGEST
-            number = validate.number(key, value, least=least, most=most, where=self.name, error=SurfaceError)
-            object.__setattr__(self, key, number)
+        _check_loads(self, "", "weight")
         if self.tension == 0.0 and self.weight != 0.0:
             hint = "a cable that weighs something must pull; give it a tension"
             validate.refuse("tension", 0.0, "> 0", self.name, hint, SurfaceError)

@@ -54,18 +54,18 @@ class Supports(NamedTuple):
         if on_planes:
             planes = [(plane, self.on_plane), *on_planes]
             for number, (guide, along) in enumerate(lines):
-                crossing = [mask for other, mask in planes if not _lies_in(guide, other)]
+                crossing = [mask for other, mask in planes if not guide.lies_in(other)]
                 leaves = along & np.any([np.zeros_like(along), *crossing], axis=0)
                 fixed |= leaves
                 lines[number] = guide, along & ~leaves
             several = (np.sum([mask for _, mask in planes], axis=0) > 1) & ~self.fixed & ~self.guided
             for meeting, rows in _by_planes(planes, several):
-                direction = _common_direction(meeting, int(rows[0]))
+                rank, line = _common_line(meeting, int(rows[0]))
                 along = np.isin(np.arange(len(fixed)), rows)
-                if direction is None:
+                if rank == 3:
                     fixed |= along
-                elif direction.any():
-                    lines.append((Line(_common_point(meeting), tuple(direction.tolist())), along))
+                elif rank == 2:  # not one plane given several times
+                    lines.append((line, along))
         fixed |= members(lines, len(fixed))
         on_line = tuple((guide, read_only(along)) for guide, along in lines)
         return {"fixed": read_only(fixed), "on_plane": read_only(self.on_plane & ~fixed), "on_line": on_line}
@@ -285,10 +285,10 @@ def checked_planes(
             continue
         sides = before, behind = int((height > near).sum()), int((height < -near).sum())
         if before and behind:
-            text = (
-                f"the surface crosses the {plane}: {before} vertices are in front of it and {behind} behind;"
+            text = f"the surface crosses the {plane}: {before} vertices are in front of it and {behind}"
+            text += (
+                " behind; keep one half, as pcmc.cut(surface, plane) gives it, or leave the mirror plane out"
             )
-            text += " keep one half, as pcmc.cut(surface, plane) gives it, or leave the mirror plane out"
             raise SurfaceError(text, what="on_planes", where=str(plane), found=sides)
         refuse_in_mirror(plane, mask, F, patch, names)
     return tuple(planes)
@@ -365,30 +365,19 @@ def _by_planes(planes: Sequence[tuple[Plane, Bools]], chosen: Bools) -> Iterator
         yield used, rows[(on == pattern[:, None]).all(axis=0)]
 
 
-def _lies_in(guide: Guide, plane: Plane) -> bool:
-    """Whether a line or circle through a point of the plane stays in it."""
-    if isinstance(guide, Circle):
-        return bool(np.linalg.norm(np.cross(guide.normal, plane.normal)) <= PARALLEL)
-    return bool(abs(np.dot(guide.direction, plane.normal)) <= PARALLEL)
+def _common_line(planes: Sequence[Plane], vertex: int) -> tuple[int, Line]:
+    """The rank of the planes' normals, and the line along all planes, of use where that is 2.
 
-
-def _common_direction(planes: Sequence[Plane], vertex: int) -> Floats | None:
-    """(3,) the direction within all planes; zero for one plane given several times, None for a point."""
-    _, sizes, directions = np.linalg.svd([plane.normal for plane in planes])
-    rank = int((sizes > PARALLEL).sum())
-    gaps = [float(plane.height(_common_point(planes))) for plane in planes]
+    Its point is the one of all planes that is nearest to the origin, in the least squares.
+    """
+    normals = np.array([plane.normal for plane in planes])
+    _, sizes, directions = np.linalg.svd(normals)
+    offsets = [np.dot(plane.normal, plane.point) for plane in planes]
+    point = np.linalg.lstsq(normals, offsets, rcond=PARALLEL)[0]
     scale = 1.0 + float(np.abs([plane.point for plane in planes]).max())
-    if np.abs(gaps).max() > PARALLEL * scale:
+    if max(abs(float(plane.height(point))) for plane in planes) > PARALLEL * scale:
         names = ", ".join(map(str, planes))
         message = f"on_planes: vertex {vertex} slides on planes that do not meet: {names}; remove it from one"
         raise SurfaceError(message, what="on_planes", where=vertex, found=names)
-    if rank == 3:
-        return None
-    return directions[2] if rank == 2 else np.zeros(3)
-
-
-def _common_point(planes: Sequence[Plane]) -> tuple[float, float, float]:
-    """The point of all planes that is nearest to the origin, in the least squares."""
-    offsets = [np.dot(plane.normal, plane.point) for plane in planes]
-    x, y, z = np.linalg.lstsq([plane.normal for plane in planes], offsets, rcond=PARALLEL)[0].tolist()
-    return x, y, z
+    line = Line(tuple(point.tolist()), tuple(directions[2].tolist()))
+    return int((sizes > PARALLEL).sum()), line

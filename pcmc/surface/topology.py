@@ -169,7 +169,7 @@ class Topology:
         """(k,) the numbers of the edges that join pairs of vertices (k,2); -1 where none does."""
         return edge_places(ends, self.edges)
 
-    def chains(self, ends: Ints, stop: Bools) -> tuple[EdgeCurve, ...]:
+    def chains(self, ends: Ints, stop: Bools | bool = False) -> tuple[EdgeCurve, ...]:
         """The curves that edges (k,2) form, cut where they branch and at the vertices ``stop`` (n,)."""
         mask = np.zeros(len(self.edges), dtype=bool)
         mask[self.edge_numbers(ends)] = True

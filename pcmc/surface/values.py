@@ -59,8 +59,7 @@ def all_values(surface: Any) -> dict[str, dict[str, float]]:
 
 def part_values(surface: Any, kind: str) -> Floats:
     """The values of one kind, in the order of the patches, cables or rooms."""
-    parts, field, _ = KINDS[kind]
-    return np.array([getattr(part, field) for part in getattr(surface, parts)], dtype=float)
+    return np.array([*all_values(surface)[kind].values()], dtype=float)
 
 
 def part_index(surface: Any, kind: str, name: str) -> int:
@@ -91,10 +90,8 @@ def with_values(
     check_weights(heavy, surface.plane, surface.on_planes, surface.vertices, surface.images)
     following: dict[str, dict[str, Any]] = {}
     for field in ("pressure", "snow"):
-        old, new = (
-            np.array([getattr(p, field) for p in patches])
-            for patches in (surface.patches, changed["patches"])
-        )
+        both = surface.patches, changed["patches"]
+        old, new = (np.array([getattr(patch, field) for patch in patches]) for patches in both)
         change = wall_changes(surface, new - old, {surface.patch_index(name) for name in of_patches[field]})
         pairs = ((surface.patches[k].name, float(old[k] + change[k])) for k in np.flatnonzero(change))
         following[field] = dict(pairs)

@@ -13,7 +13,6 @@ from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError
 from ..project.varied import with_units
-from ..solvers import find_method
 from .grid import Sweep
 from .solving import case_row, mesh_columns
 
@@ -35,7 +34,7 @@ def project_sweep(
     grid, fixed : as of ``Sweep``, by the names of ``pcmc.project.varied``: ``NAME.tension`` and
         ``NAME.pressure`` of patches, the numbers of the file, such as ``plan.edge_length``, and shifts of
         lines, such as ``wall 1.x``.
-    method : replaces the project's method and its options.
+    method : replaces the project's method and its options; a warning names these.
     mesh_check, search : as of ``solve_case``; the project's own key ``solve.mesh_check`` counts, too.
 
     Raises
@@ -50,7 +49,7 @@ def project_sweep(
     fixed = dict(fixed or {})
     about: dict[str, Any] = {"project": Path(path).as_posix(), "project_digest": projects.digest(path)}
     if method is not None:
-        find_method(method)
+        projects.load(path).solved_by(method)
         about["method"] = method
     flags = {"mesh_check": mesh_check, "search": search}
     about |= {name: True for name, value in flags.items() if validate.flag(name, value)}
@@ -94,8 +93,8 @@ def solve_varied(
         text += f" it is {digest:.12}…); undo the change, or begin a new sweep with a new store"
         raise FileError(text, what=project, found=digest, expected=project_digest)
     design, start = projects.varied(project, values)
-    if method not in (None, design.method):
-        design = replace(design, method=method, options={})
+    if method is not None:
+        design = design.solved_by(method)
     outcome = projects.solve_project(replace(design, search=search), start)
     names = ("project", "project_digest", "method", "mesh_check", "search", *values)
     answer = case_row(outcome.solved, names, outcome)

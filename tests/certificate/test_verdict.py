@@ -8,11 +8,13 @@ from scipy.optimize import brentq
 from shapes import pyramid, shaken
 from starts import double_bubble, four_fans, spherical_cap, two_squares
 
+import pcmc
 from pcmc import Patch, Surface, certify, solve
 from pcmc.certificate import Evidence, Verdict
 from pcmc.certificate.balance import coarseness, load_ratio
 from pcmc.certificate.proof import Attempt
 from pcmc.certificate.verdict import Findings, judge
+from pcmc.plan import Plan
 from pcmc.solvers.result import Status
 from pcmc.stability.modes import Spectrum
 
@@ -311,3 +313,13 @@ def test_coordinates_of_single_precision_are_named_where_they_alone_leave_forces
         found = certify(roof.moved(places))
         assert ("single precision" in found.detail) == (single and not moved)
         assert (found.verdict is Verdict.NOT_CONVERGED) == (single or moved > 0.0)
+
+
+def test_a_half_in_single_precision_has_its_mirror_in_double(tmp_path):
+    """Where it is read, its vertices come exactly onto the plane, here at 20 ft."""
+    outline, mirror = [[0, 0], [6.096, 0], [6.096, 7.62], [0, 7.62]], [[6.096, 0], [6.096, 7.62]]
+    half = Plan(outline, edge_length=1.0, tension=5.0, mirrors=[mirror]).surface()
+    pcmc.write(tmp_path / "half.glb", solve(half).surface)
+    found = certify(pcmc.read(tmp_path / "half.glb"))
+    assert found.verdict is Verdict.NOT_CONVERGED
+    assert "single precision" in found.detail

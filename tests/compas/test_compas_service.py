@@ -88,7 +88,7 @@ BAD_VALUES = {
     "cable": (lambda m: m[0].edgedata.update({"0-1": {"cable": ["a"]}}), "'cable' must be a name"),
     "edge": (lambda m: m[0].edgedata.update({"0": {"cable": "a"}}), "one is damaged"),
     "face": (lambda m: m[0].face.update({0: [[1], [2], [3]]}), "one is damaged"),
-    "huge": (lambda m: m[0].vertex[0].update(x=10**400), "one is damaged"),
+    "huge": (lambda m: m[0].vertex[0].update(x=10**400), "set its x, y and z to finite numbers"),
 }
 
 

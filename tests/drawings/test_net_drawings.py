@@ -11,7 +11,7 @@ from nightly import at_night
 import pcmc
 from pcmc.base.units import Units
 from pcmc.cli import main
-from pcmc.drawings.net_drawings import net_drawings
+from pcmc.drawings import net_drawings
 from pcmc.drawings.sheet import table_sheets
 from pcmc.panelling import panel_net
 from pcmc.plan import Plan

@@ -14,6 +14,7 @@ from pcmc.explore import following
 from pcmc.explore.following import ProjectFallback, Reached
 from pcmc.explore.roof import read_roof
 from pcmc.explore.session import Session, solved_start
+from pcmc.project.values import data_with_values
 
 CAP = spherical_cap(edge_length=0.25)
 OPEN_WALL = """[plan]
@@ -93,7 +94,9 @@ def test_a_roof_that_following_does_not_reach_is_solved_from_the_start_shape(pat
 def test_a_project_with_one_tension_or_a_rise_has_its_own_way_too(path, key, asked):
     path.write_text(OPEN_WALL.partition("[plan.patches]")[0] + key + "\n")
     before = read_roof(path, start_shape=True).surface
-    project, start = own(path).start(before.retensioned(asked))
+    wanted = before.retensioned(asked)
+    walls = {("tensions", patch.name) for patch in wanted.patches if patch.wall}
+    project, start = data_with_values(path, own(path).data, wanted, walls)[1:]
     assert tensions(start).items() >= asked.items()
     assert not project.targets
     assert tensions(start)["wall 1"] != tensions(before)["wall 1"]  # balanced anew

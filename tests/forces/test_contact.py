@@ -10,7 +10,6 @@ from pcmc import Patch, Surface, Verdict, certify, energy, solve
 from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.forces.pinching import (
     StandingPart,
-    beside_resting,
     lift,
     place_wall_rows,
     pull_and_capacity,
@@ -207,7 +206,8 @@ def test_curves_and_neighbours_of_the_resting_part():
     corner = corner[np.argsort(full.vertices[corner, 1])][0]
     expected = [(crest[0], corner), (crest[0], crest[1]), (crest[1], crest[0]), (crest[1], crest[2])]
     assert sorted(map(tuple, resting_links(walls, resting).tolist())) == sorted(expected)
-    assert np.flatnonzero(beside_resting(walls, resting)).tolist() == [crest[2]]
+    level = StandingPart.of(full, walls, resting).classes.level
+    assert np.flatnonzero(level).tolist() == [crest[2]]
     spacing = top_spacing(full, walls)
     assert spacing[corner] == pytest.approx(4 / 6)
     assert np.isinf(spacing[np.setdiff1d(np.arange(full.n), walls.top_edges)]).all()

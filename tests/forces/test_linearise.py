@@ -38,7 +38,7 @@ def slope(surface, classes):
     d = np.random.default_rng(0).standard_normal(X.shape)  # off the motion space too
     d[surface.fixed] = 0.0
     d[surface.on_plane] = surface.plane.along(d[surface.on_plane])
-    exact = linearise(surface, classes, space, X, energy_and_gradient(surface, X)[1]).times(d)
+    exact = linearise(surface, classes, space, X, energy_and_gradient(surface, X)[1])(d)
     errors = [
         np.abs(
             space.to_coordinates(forces(surface, classes, X + t * d) - forces(surface, classes, X - t * d))

@@ -8,7 +8,7 @@ from shapes import disc, placed, pyramid, rotation, shaken, three_patches
 from generators import two_squares
 from pcmc import Patch, Plane, Surface, energy, gradient, solve
 from pcmc.forces.functional import energy_and_gradient
-from pcmc.forces.motion_space import MotionSpace, force_scale, motion_space, vertex_classes
+from pcmc.forces.motion_space import force_scale, motion_space, vertex_classes
 from pcmc.forces.pinching import resting_links, standing_part
 from pcmc.surface.topology import CURVE, POINT, SHEET
 
@@ -280,16 +280,3 @@ def test_force_scale_is_the_norm_of_the_triangles_forces():
     # four triangles with sides 2, √3, √3: each corner is pulled with ½ α of the side opposite
     assert force_scale(surface, classes, surface.vertices) == pytest.approx(0.75 * np.sqrt(4 * 10.0))
     assert force_scale(surface, classes, 0 * surface.vertices) == 1.0
-
-
-def test_components_pass_from_one_basis_to_another():
-    surface = three_patches(4)
-    classes = vertex_classes(surface)
-    spaces = [motion_space(surface, classes, X) for X in (surface.vertices, shaken(surface).vertices)]
-    held = spaces[1].dimension.copy()
-    held[::3] = np.minimum(held[::3], 1)  # as where a vertex has come to rest
-    now, then = spaces[0], MotionSpace.of(spaces[1].basis, held)
-    s = np.random.default_rng(6).normal(size=now.size)
-    there = then.from_other(now, s)
-    assert len(there) == then.size < now.size
-    np.testing.assert_array_equal(there, then.to_coordinates(now.to_vectors(s)))

@@ -6,7 +6,7 @@ from volume_cases import cap, cylinder, raised
 
 import generators
 import pcmc
-from pcmc import Line, Patch, Room, Surface
+from pcmc import Line, Patch, Plane, Room, Surface
 from pcmc.forces.rooms import prescribed_volumes, room_pressures, room_volumes, with_room_pressures
 from pcmc.meshing.local_refinement import refine_faces
 from pcmc.meshing.refinement import refine
@@ -56,8 +56,16 @@ def test_files_carry_rooms(suffix, tmp_path):
     assert again.walls.tolist() == bubbles.walls.tolist()
 
 
+def half_tent() -> Surface:
+    """The half of a tent beside a mirror plane that does not pass through the point of Π."""
+    mirror = Plane((5, 0, 0), (1, 0, 0), mirror=True)
+    return Surface([[5, -1, 0], [6, 0, 0], [5, 1, 0], [5, 0, 1]], [[0, 1, 3], [1, 2, 3]], [0, 0],
+                   [Patch("tent", 1.0, 0.0)], [0, 1, 2], on_planes={mirror: [0, 2, 3]},
+                   rooms=[Room("r", {"tent": 1}, 0.4)])  # fmt: skip
+
+
 @pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
-@pytest.mark.parametrize("name", ["bubbles", "raised roof", "cap", "plates"])
+@pytest.mark.parametrize("name", ["bubbles", "raised roof", "cap", "plates", "beside a mirror"])
 def test_evolver_has_the_same_volumes_energy_and_gradient(name):
     bubbles = generators.double_bubble(0.8, volumes=(1.0, 0.7))
     surface = {
@@ -65,6 +73,7 @@ def test_evolver_has_the_same_volumes_energy_and_gradient(name):
         "raised roof": raised(),
         "cap": cap(1.0, 0.4),
         "plates": cylinder(0.6, 3.0, "plates"),
+        "beside a mirror": half_tent(),
     }[name]
     out = evolver.run(surface, 'foreach body bb do printf "V %.17g %.17g\\n", bb.volume, bb.target')
     found = evolver.numbers(out, "V", 2)

@@ -45,7 +45,8 @@ def test_tensions_and_walls_that_are_chosen_for_a_drawing_are_printed(tmp_path):
     def chosen(plan):
         path.write_text(f'[plan]\ndrawing = "{file.name}"\n{plan}')
         loaded = project.load(path)
-        return chosen_values(loaded.plan, loaded.chosen.text, project.surface_of(loaded)), loaded
+        surface = project.surface_of(loaded)
+        return chosen_values(loaded.plan, loaded.chosen.text, surface, surface), loaded
 
     (text,), loaded = chosen('[plan.patches]\n"patch 1" = {tension = 9}\n')
     tension, wall = loaded.plan.patches[1].tension, loaded.plan.dividers[0].wall
@@ -57,6 +58,22 @@ def test_tensions_and_walls_that_are_chosen_for_a_drawing_are_printed(tmp_path):
     assert chosen('edge_length = 1\ntension = 5\n[[plan.dividers]]\nname = "seam"\nwall = 2\n')[0] == []
     (text,), _ = chosen('edge_length = 1\ntension = 5\n[[plan.dividers]]\nname = "seam"\nwall = "balanced"\n')
     assert text.startswith("walls balanced with their neighbours: 'seam'")
+
+
+def test_chosen_walls_are_those_of_the_tensions_in_the_file(tmp_path, capsys):
+    """The wall of 1.8 balances 5 with 4.5: it is not "balanced" beside 6, nor is one that is typed."""
+    path = tmp_path / "hall.toml"
+    outline, divider = "[[0, 0], [12, 0], [12, 8], [0, 8]]", "{curve = [[6, 0], [6, 8]]}"
+    plan = f"outline = {outline}\ndividers = [{divider}]\nedge_length = 1.5\n"
+    path.write_text(f"[plan]\n{plan}patches = {{west = {{tension = 5}}, east = {{tension = 4.5}}}}\n")
+
+    def printed(*given):
+        cli.main(["solve", str(path), "--no-mesh-check", "--no-cache", *given])
+        return capsys.readouterr().out
+
+    assert "walls balanced with their neighbours: 'wall 1' 1.8" in printed()
+    assert "walls that balance the tensions of the file: 'wall 1' 1.8" in printed("--tension", "west=6")
+    assert "walls" not in printed("--tension", "wall 1=2.5").split("stable")[0]
 
 
 def test_a_sail_with_slender_corners_gets_cables_that_fit_in_them(tmp_path, capsys):

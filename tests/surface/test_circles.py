@@ -129,7 +129,7 @@ def test_the_derivative_of_the_forces_is_the_limit_of_differences():
     d[surface.fixed & (space.dimension == 0)] = 0.0
     assert (space.dimension[surface.fixed] == 1).sum() == 3
     d[surface.on_plane] = surface.plane.along(d[surface.on_plane])
-    exact = linearise(surface, classes, space, X, energy_and_gradient(surface, X)[1]).times(d)
+    exact = linearise(surface, classes, space, X, energy_and_gradient(surface, X)[1])(d)
     errors = []
     for t in surface.size * np.array([2e-5, 1e-5]):
         change = forces(surface, classes, X + t * d) - forces(surface, classes, X - t * d)

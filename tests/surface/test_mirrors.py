@@ -154,7 +154,7 @@ def test_linearised_forces_at_mirrors(case):
     d = space.to_vectors(s / np.abs(s).max())
     t = 1e-5 * surface.size
     numeric = space.to_coordinates((forces(X + t * d) - forces(X - t * d)) / (2 * t))
-    assert np.abs(here.times(d) - numeric).max() < 1e-7 * np.abs(numeric).max()
+    assert np.abs(here(d) - numeric).max() < 1e-7 * np.abs(numeric).max()
 
 
 def test_schwarz_p():

@@ -139,7 +139,7 @@ def test_linearised_forces(case):
     d /= np.abs(d).max()
     t = 1e-5
     numeric = space.to_coordinates((forces(X + t * d) - forces(X - t * d)) / (2 * t))
-    assert np.abs(here.times(d) - numeric).max() < 1e-8
+    assert np.abs(here(d) - numeric).max() < 1e-8
 
 
 @pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")

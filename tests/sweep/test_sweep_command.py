@@ -89,6 +89,16 @@ def test_a_surface_is_swept_too_by_any_method(roof, capsys):
     assert "unknown number 'plan.edge_length'" in capsys.readouterr().err
 
 
+def test_options_that_another_method_leaves_out_are_named(roof, capsys):
+    roof.write_text(TEXT + "order = 2\n", encoding="utf-8")
+    left = "roof.toml: method lbfgs solves without the file's options of newton: tolerance = 1e-11, order = 2"
+    for given in (["solve", "roof.toml"], ["sweep", "roof.toml", "east.tension=3", "--workers", "1"]):
+        cli.main([*given, "--method", "lbfgs"])
+        assert capsys.readouterr().err.count(left) == 1
+        cli.main([*given, "--method", "newton"])
+        assert left not in capsys.readouterr().err
+
+
 def test_an_accuracy_that_is_missed_is_1(roof):
     roof.write_text(TEXT + "accuracy = {height = 1e-9}\nmost_triangles = 9\n", encoding="utf-8")
     assert cli.main(["sweep", "roof.toml", "east.tension=3", "--workers", "1", "--csv", "t.csv"]) == 1

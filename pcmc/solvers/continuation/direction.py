@@ -17,7 +17,7 @@ from ...base import validate
 from ...base.arrays import Floats
 from ...base.errors import OptionError
 from ...base.tolerances import ON_BRANCH
-from ...forces.functional import Rates, energy_by, gradient_by
+from ...forces.functional import Rates, by_rates
 from ...forces.rooms import refuse_varied_pressure
 from ...surface import Surface
 from ...surface.supports import apply_supports
@@ -188,8 +188,8 @@ class ParameterLine:
 
     def energy_derivative(self, surface: Surface, X: Floats, value: float) -> float:
         """∂E/∂λ at X (n,3)."""
-        return energy_by(surface, self.rates, X)
+        return by_rates(surface, self.rates, X)[0]
 
     def gradient(self, surface: Surface, X: Floats) -> Floats:
         """∂∇E/∂λ (n,3), supports applied."""
-        return apply_supports(surface, gradient_by(surface, self.rates, X), X)
+        return apply_supports(surface, by_rates(surface, self.rates, X)[1], X)

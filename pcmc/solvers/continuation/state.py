@@ -103,7 +103,7 @@ class BranchState:
         rest, line = self.rest, self.mesh.line
         change = rest.space.to_coordinates(line.gradient(rest.surface, self.X))
         if self.carried is not None:
-            change = change + rest.jacobian.times(self.carried)
+            change = change + rest.jacobian(self.carried)
         return np.append(change, -rest.volume_units * line.rates.get("volumes", 0.0))
 
     @cached_property
