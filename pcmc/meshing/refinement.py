@@ -227,11 +227,8 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
     own, top, share, offset = rows.vertices, X.copy(), np.zeros((surface.n, 1)), np.zeros_like(X)
     drop, down, of_wall = X - surface.plane.nearest(X), resting.copy(), resting | walls.top_free
     drop[walls.held] = X[walls.held] - X[walls.foot[walls.held]]
-    top[own], share[own, 0], drop[own] = (
-        rows.top_places(X),
-        1.0 - rows.relative_height,
-        rows.drops(surface, X),
-    )
+    top[own], drop[own] = rows.top_places(X), rows.drops(surface, X)
+    share[own, 0] = 1.0 - rows.relative_height
     offset[own], of_wall[own], down[own] = rows.offset, True, under_low(rows, resting | walls.corner)
     rising = of_wall[start] & of_wall[end] & (down[start] != down[end])
     rising &= ~(surface.fixed[start] & surface.fixed[end])
