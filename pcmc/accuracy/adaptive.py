@@ -143,7 +143,6 @@ def solve_to_accuracy(
 
     Parameters
     ----------
-    surface : the surface to start from.
     accuracy : the error bar wanted, by quantity, in its unit: ``{"height": 1e-3}`` or ``"height=1e-3"``.
         Quantities are those of the mesh check: height, area, volume, energy, reaction, thrust, reaction
         per length, lowest eigenvalue; with a patch, as in ``"height of north"``, that patch's alone.

@@ -239,7 +239,6 @@ def margin(
 
     Parameters
     ----------
-    surface : at rest.
     what : ``"pressure"``, ``"snow"``, ``"weight"`` and ``"tension"`` (both with cables), ``"cable"``,
         ``"cable_weight"`` or ``"volume"``: all of a kind in proportion; or one of them, such as
         ``"pressure of hall"``; the name of a patch or cable alone means its tension. What is 0 now is added,
@@ -249,8 +248,7 @@ def margin(
         largest pressure, or tension over size.
     meshes : on so many meshes in all, each once refined from the one before, for the bar.
     corners : as of ``pcmc.check_mesh``.
-    callback : called with a ``Progress`` at each step. Where it raises StopIteration, the search ends with
-        KeyboardInterrupt.
+    callback : called with a ``Progress`` at each step; StopIteration in it ends with KeyboardInterrupt.
     certificate : of the surface, if it is known.
 
     Raises

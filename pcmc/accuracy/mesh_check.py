@@ -136,9 +136,9 @@ def check_mesh(
         ``"polygon"``, on the straight edges; or a function (k,3) → (k,3) that puts points of the edges
         on the exact curve. Vertices that slide on Π stay on it.
     corners : vertices (k,) at which held curves have corners for sure, also where they turn by less.
-    callback : called with a ``Progress`` after each step of the solver. Where it raises StopIteration,
-        the check ends with KeyboardInterrupt, as with Ctrl-C.
-    most_triangles : the most that the finest mesh may have.
+    callback : called with a ``Progress`` after each step of the solver. StopIteration in it, or Ctrl-C, ends
+        the check with KeyboardInterrupt.
+    most_triangles : of the finest mesh.
 
     Raises
     ------

@@ -47,7 +47,6 @@ def cutting_pattern(
 
     Parameters
     ----------
-    surface : a certified surface.
     width : of the cloth: no strip is wider, with its allowances.
     anyway : cut a surface that is not certified.
     certificate : of the surface, where it is known; by default it is computed.

@@ -44,8 +44,7 @@ def surface_from_labels(
         labels the mesh is one patch, "surface".
     tension, pressure : of all patches, or a mapping from their names.
     boundary : the support of the boundary: "fixed", "sliding" on Π, or "free".
-    walls : tension of walls under the borders between patches (see ``add_walls``).
-    bottom : of those walls.
+    walls, bottom : tension of walls under the borders between patches, and their bottom; see ``add_walls``.
     plane : Π; z = 0 by default.
     weld : vertices nearer than this to each other are merged, length.
 

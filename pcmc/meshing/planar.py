@@ -47,9 +47,7 @@ def triangulate(
 
     Parameters
     ----------
-    points : (k,2) required vertices.
-    segments : (s,2) int, required edges between them, which meet only at their ends.
-    edge_length : of the triangles, length.
+    points, segments : (k,2) required vertices; (s,2) required edges between them, which meet at ends alone.
     holes : a point (x, y) inside each region to leave out.
 
     Raises

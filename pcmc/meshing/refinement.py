@@ -49,7 +49,6 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
 
     Parameters
     ----------
-    levels : how often, ≥ 0.
     project : (k,3) → (k,3), applied to the new fixed vertices on no curve at each level: puts them on a
         curved boundary that the edges only approximate.
 

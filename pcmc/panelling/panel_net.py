@@ -176,7 +176,6 @@ def panel_net(
 
     Parameters
     ----------
-    surface : a certified surface.
     size : of a panel's edge, length, in the mean.
     pattern : "planar-quads" along lines of curvature, made planar; "quads" between the lines of a grid in
         plan, with their nodes on the surface; or "hexagons" of a grid in plan, made planar.

@@ -134,7 +134,6 @@ def panels(
 
     Parameters
     ----------
-    surface : a certified surface.
     tolerance : largest difference between corresponding edges of two panels of a family, length, > 0.
     mirror_images : "alike": a panel that is turned over fits, as where both sides are the same; "apart":
         mirror images are of different families.
