@@ -229,7 +229,7 @@ class Stepper:
             return change
 
         def inverse(z: Floats) -> Floats:
-            return self._in_basis_of(second, second.bordered.solve, z)
+            return self._in_basis_of(second, second.bordered, z)
 
         if second.stiffness != 0.0:
             z, steps = inverse(right), 0
