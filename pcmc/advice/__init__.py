@@ -2,3 +2,7 @@
 
 Gives these to projects. May import ``design`` and the subpackages below them.
 """
+
+from ..base.libraries import require
+
+require("shapely", extra="plan")

@@ -19,7 +19,6 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..base.libraries import require
 from ..base.tolerances import ON
 from ..plan import Divider, Hole, Plan, patch_names
 from ..plan.edges import usual_cable
@@ -97,7 +96,6 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
 
     if not rises:
         return plan, [], []
-    require("shapely", extra="plan")
     from ..plan.draft import part_count
     from ..plan.proposal import largest_circle, least_tension, least_tensions, plan_area
 

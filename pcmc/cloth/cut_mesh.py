@@ -17,7 +17,7 @@ from ..base.tolerances import ON
 from ..meshing.curve_cutting import cut_triangles, refined_round
 from ..meshing.quality import edge_lengths
 from ..surface import Surface
-from ..surface.geometry import angles, bounding_size, lengths_along, segment_lengths
+from ..surface.geometry import angles, bounding_size, file_origin, lengths_along, segment_lengths
 from ..surface.pieces import point_text
 from ..surface.topology import SIDES, Topology, components, edge_places, topology
 
@@ -139,12 +139,13 @@ class CutMesh:
         if (wanted := np.isin(both, self.pieces.piece[faces])).any():
             both = both[wanted]
         library, found = load_library("potpourri3d", "cloth"), list[tuple[float, Floats, int]]()
+        origin = file_origin(self.X, self.size)  # near it the library's lengths keep their digits
         for piece in both.tolist():
             used, local = np.unique(self.pieces.faces[self.pieces.piece == piece], return_inverse=True)
             vertex = self.pieces.vertex[used]
-            solver = library.EdgeFlipGeodesicSolver(self.X[vertex], local.reshape(-1, 3))
+            solver = library.EdgeFlipGeodesicSolver(self.X[vertex] - origin, local.reshape(-1, 3))
             for ends in product(*(np.flatnonzero(vertex == v).tolist() for v in (start, end))):
-                path = np.asarray(solver.find_geodesic_path(*ends))
+                path = np.asarray(solver.find_geodesic_path(*ends)) + origin
                 found.append((float(lengths_along(path)[-1]), path, piece))
         _, path, piece = min(found, key=lambda one: one[0])
         sides = self.topology.edges_of(self.pieces.piece == piece)

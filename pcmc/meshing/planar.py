@@ -12,7 +12,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import ON
-from ..surface.geometry import angles, cross_2d, segment_lengths
+from ..surface.geometry import angles, bounding_size, cross_2d, file_origin, segment_lengths
 from ..surface.topology import SIDES, components, edge_places
 from .quality import improve_angles
 
@@ -63,13 +63,15 @@ def triangulate(
     >>> float(signed_areas(mesh.points, mesh.triangles).sum())
     3.0
     """
-    fixed = np.asarray(points, dtype=float)
+    given = np.asarray(points, dtype=float)
+    origin = file_origin(given, bounding_size(given))  # near it distances keep their digits
+    fixed, inside_holes = given - origin, np.reshape(holes, (-1, 2)) - origin
     segments = np.asarray(segments, dtype=np.int64)
     validate.positive("edge_length", edge_length)
     near = cKDTree(fixed).query_pairs(1e-9 * edge_length)
     if near:
         i, j = min(near)
-        problem = f"points {i} and {j} coincide at {fixed[i].tolist()}; merge them"
+        problem = f"points {i} and {j} coincide at {given[i].tolist()}; merge them"
         raise SurfaceError(problem, what="points", where=(i, j))
     if len(segments) < 3:
         problem = f"segments: at least 3 are needed to enclose an area, found {len(segments)}"
@@ -77,7 +79,7 @@ def triangulate(
     spacing = np.full(len(fixed), float(edge_length))  # at each point its shortest segment
     np.minimum.at(spacing, segments.ravel(), np.repeat(segment_lengths(fixed, segments), 2))
     everything = np.concatenate([fixed, _lattice(fixed, segments, edge_length)])
-    mesh = _inside(everything, segments, holes, len(fixed))
+    mesh = _inside(everything, segments, inside_holes, len(fixed), origin)
     for step in range(ROUNDS):
         X, T = mesh.points, mesh.triangles
         if step % 4 == 0 and step < ROUNDS - 4:
@@ -90,10 +92,11 @@ def triangulate(
             np.add.at(moment, T.ravel(), np.repeat(area[:, None] * X[T].mean(axis=1), 3, axis=0))
             np.add.at(weight, T.ravel(), np.repeat(area, 3))
             X = np.concatenate([fixed, moment[len(fixed) :] / weight[len(fixed) :, None]])
-        mesh = _inside(X, segments, holes, len(fixed))
+        mesh = _inside(X, segments, inside_holes, len(fixed), origin)
     movable = np.arange(len(mesh.points)) >= len(fixed)
     flat = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
-    return replace(mesh, points=improve_angles(flat, mesh.triangles, movable, GOOD_ANGLE)[:, :2])
+    better = improve_angles(flat, mesh.triangles, movable, GOOD_ANGLE)[:, :2]
+    return replace(mesh, points=better + origin)
 
 
 def signed_areas(points: Floats, triangles: Ints) -> Floats:
@@ -143,7 +146,7 @@ def _clear(candidates: Floats, points: Floats, segments: Ints, clearance: Floats
     return distance >= CLEARANCE * reach[nearest]
 
 
-def _inside(points: Floats, segments: Ints, holes: Sequence[Sequence[float]], k: int) -> PlanarMesh:
+def _inside(points: Floats, segments: Ints, holes: Floats, k: int, origin: Floats) -> PlanarMesh:
     """The Delaunay triangulation with every segment an edge, inside the outline and outside the holes; points
     used elsewhere only go.
 
@@ -156,19 +159,19 @@ def _inside(points: Floats, segments: Ints, holes: Sequence[Sequence[float]], k:
     area = signed_areas(points, T)
     T[area < 0] = T[area < 0][:, ::-1]
     for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0]:
-        T = _with_segment(points, T, int(a), int(b))
+        T = _with_segment(points, T, int(a), int(b), origin)
     for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0].tolist():
-        raise _crossing(points, a, b)
+        raise _crossing(points + origin, a, b)
     sides = T[:, SIDES].reshape(-1, 2)
     free = edge_places(sides, segments) < 0
     pairs = twins(sides.min(axis=1) * len(points) + sides.max(axis=1))
     part = components(pairs[free[pairs[:, 0]]] // 3, len(T))
     free[pairs] = False
     outer = np.unique(part[np.flatnonzero(free) // 3])
-    located = locate(PlanarMesh(points, T, part), np.reshape(holes, (-1, 2)).astype(float))
+    located = locate(PlanarMesh(points, T, part), holes)
     for place, triangle in enumerate(located):
         if triangle == OUTSIDE or part[triangle] in outer:
-            problem = f"the point {list(holes[place])} of hole {place} lies outside the outline"
+            problem = f"the point {(holes[place] + origin).tolist()} of hole {place} lies outside the outline"
             raise OptionError(problem, what="holes", where=place)
     kept = ~np.isin(part, [*outer, *part[located]])
     if not kept.any():
@@ -191,7 +194,7 @@ def _crossing(X: Floats, a: int, b: int) -> SurfaceError:
     return SurfaceError(f"{problem} split it there", what="segments", where=(a, b))
 
 
-def _with_segment(X: Floats, T: Ints, a: int, b: int) -> Ints:
+def _with_segment(X: Floats, T: Ints, a: int, b: int, origin: Floats) -> Ints:
     """The triangulation with edge (a, b); the triangles that it crosses are replaced (Anglada, 1997)."""
     E = T[:, SIDES]
     u, v = X[E[..., 0]], X[E[..., 1]]
@@ -213,7 +216,7 @@ def _with_segment(X: Floats, T: Ints, a: int, b: int) -> Ints:
             rim.append(at)
             at = follow.get(at)
         if at != end or not rim:
-            raise _crossing(X, a, b)
+            raise _crossing(X + origin, a, b)
         new += _delaunay_below(X, end, start, rim[::-1])
     return np.concatenate([T[~crossed], np.array(new, dtype=np.int64)])
 

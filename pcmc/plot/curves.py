@@ -211,7 +211,7 @@ def heatmap(
     figure = new(width, width * ratio * -(-len(data) // columns) / columns + 200.0, pad=6.0)
     from matplotlib.colors import LogNorm, Normalize  # as ``new`` has found it installed
 
-    panels, _ = grid(figure, len(data), columns)
+    panels = grid(figure, len(data), columns)
     known = np.concatenate([table[np.isfinite(table)] for table in data.values()])
     low, high = limits or ((known.min(), known.max()) if len(known) else (1.0, 10.0))
     if not low < high:

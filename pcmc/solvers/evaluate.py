@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -74,6 +74,10 @@ class Evaluator:
         self._surface = surface
         self._more = any(True for _ in elements(surface, surface.vertices))
         self._single = len(blocks(surface.m, threads())) == 1 and not (self._mesh.curved or surface.heavy)
+
+    def row(self, point: Point) -> dict[str, Any]:
+        """The point as a row of a solver's history."""
+        return {"evaluation": self.count, "energy": point.energy, "gradient_squared": point.squared}
 
     def ending(self, point: Point) -> Status | None:
         """Why to stop at a point, or None."""

@@ -136,13 +136,13 @@ def bounding_size(X: Floats) -> float:
 
 
 def file_origin(X: Floats, size: float) -> Floats:
-    """(3,) the point that coordinates with seven digits are measured from: zero, or whole numbers near.
+    """(d,) the point from which far coordinates (n,d) are measured: zero, or whole numbers near.
 
     >>> file_origin(np.array([[1000.0, 0, 0], [1001, 0, 0], [1000, 1, 1]]), 1.7).tolist()
     [1000.0, 0.0, 0.0]
     """
     middle = X.mean(axis=0)
-    return np.round(middle) if np.linalg.norm(middle) > FAR * size else np.zeros(3)
+    return np.round(middle) if np.linalg.norm(middle) > FAR * size else np.zeros_like(middle)
 
 
 def lengths_along(points: Floats) -> Floats:

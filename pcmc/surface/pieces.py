@@ -198,21 +198,23 @@ def to_space(local: Floats, plane: Plane) -> Floats:
 def point_text(point: Floats, size: float | None = None) -> str:
     """A point (2,) or (3,), for messages; its height where that is not 0.
 
-    It has six digits of its largest coordinate; a place on a surface of some ``size`` is rounded to a ten
-    thousandth of that, or finer.
+    It has six digits of its largest coordinate and two decimals at least, for those of a survey; a place on a
+    surface of some ``size`` is rounded to a ten thousandth of that, or finer.
 
     >>> point_text(np.array([9.5096189432, 0.0])), point_text(np.array([2.5, 3.25, 4e-16]))
     ('(9.50962, 0)', '(2.5, 3.25)')
+    >>> point_text(np.array([500004.738, 5812346.0]))
+    '(500004.74, 5812346)'
     >>> point_text(np.array([6.18012, 3.92134, 0.0929]), 15.0)
     '(6.18, 3.921, 0.093)'
     >>> point_text(np.array([6.18012e-5, 3.92134e-5, 0.0929e-5]), 15e-5)
     '(6.18e-05, 3.921e-05, 9.3e-07)'
     """
-    largest = float(np.abs(point).max(initial=0.0)) if size is None else size
+    largest = min(float(np.abs(point).max(initial=0.0)), 1000.0) if size is None else size
     if largest > 0.0:
         point = np.round(point, (5 if size is None else 4) - math.floor(math.log10(largest))) + 0.0
     shown = point if point[2:].any() else point[:2]
-    return f"({', '.join(f'{value:.{6 if size is None else 12}g}' for value in shown)})"
+    return f"({', '.join(f'{value:.12g}' for value in shown)})"
 
 
 def two_digits(value: float, rounded: Callable[[float], int] | None = None) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 import pcmc
 from pcmc.accuracy.quantities import readings
 from pcmc.design import Target
@@ -25,3 +27,16 @@ def test_two_courtyards_have_a_row_each():
 def test_two_heights_have_a_name_each():
     labels = [Target("height", (EAST + x, NORTH), 1.0).label for x in (0.1, 0.2)]
     assert labels == ["height at (512340.35, 5412340.75)", "height at (512340.45, 5412340.75)"]
+
+
+def test_a_roof_there_has_the_mesh_the_margin_and_the_cloth_of_the_same_roof_here():
+    roofs = []
+    for x, y in ((0.0, 0.0), (500000.0, 5812345.0)):
+        corners, line = [[x, y], [x + 12, y], [x + 12, y + 8], [x, y + 8]], [[x + 4, y], [x + 4, y + 8]]
+        hole = Hole({"circle": {"centre": [x + 8, y + 4], "radius": 1.0}})
+        plan = Plan(corners, [line], edge_length=1.0, tension=2.6, holes=[hole])
+        roofs.append(pcmc.solve(plan.surface()).surface)
+    pressure = [pcmc.margin(roof, "pressure", meshes=1).factor for roof in roofs]
+    assert pressure[1] == pytest.approx(pressure[0], rel=0.01)
+    strain = [pcmc.cutting_pattern(roof, width=2.0).table["strain_rms"].max() for roof in roofs]
+    assert strain[1] == pytest.approx(strain[0], rel=0.2)  # the meshes differ a little

@@ -367,6 +367,15 @@ def test_without_typer_the_extra_is_named(monkeypatch, capsys):
     assert err.count("\n") == 1
 
 
+def test_without_shapely_the_extra_is_named():
+    """Every command reads projects, and projects need it."""
+    code = "import sys; sys.modules['shapely'] = None; import pcmc.cli; sys.exit(pcmc.cli.main(['--help']))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert "pcmc-surfaces[plan]" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
 def test_a_mistake_of_our_own_is_not_hidden(folder, monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError
