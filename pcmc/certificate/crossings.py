@@ -100,9 +100,9 @@ def _crossing(X: Floats, F: Ints, boxes: Floats, clear: float) -> Ints:
             for i in range(one * LEAF, min(one * LEAF + LEAF, len(F))):
                 other = node - leaves
                 for j in range(max(other * LEAF, i + 1), min(other * LEAF + LEAF, len(F))):
-                    if not _share(F, i, j) and (
-                        _goes_through(X, i, j, clear) or _goes_through(X, j, i, clear)
-                    ):
+                    if _share(F, i, j):
+                        continue
+                    if _goes_through(X, i, j, clear) or _goes_through(X, j, i, clear):
                         if count == len(found):
                             found = np.concatenate((found, np.empty_like(found)))
                         found[count, 0], found[count, 1] = i, j

@@ -68,7 +68,7 @@ class Snow:
     load: float  # s, force per area of the plan; negative for a lift
     patches: Sequence[str] = ()  # names of those that carry it; by default all ``in_the_open``
     name: str = "snow"  # of its step
-    slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it lies where the slope is between these
+    slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it lies on slopes over the first, up to the second
     area: Sequence[Sequence[float]] = ()  # points [x, y] of Π: it lies in their polygon; empty: everywhere
     slides: Sequence[float] = ()  # degrees: whole up to the first slope, none from the second, linear between
 
@@ -106,7 +106,7 @@ class Wind:
 
     pressures: Mapping[str, float]  # force per area by patch name
     name: str = "wind"  # of its step
-    slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it acts where the slope is between these
+    slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it acts on slopes over the first, up to the second
     area: Sequence[Sequence[float]] = ()  # points [x, y] of Π: it acts in their polygon; empty: everywhere
 
     def __post_init__(self) -> None:
@@ -268,7 +268,7 @@ def _in_zone(load: Snow | Wind, surface: Surface) -> Bools:
     """(m,) the faces whose slope is a load's, and whose middle is in its area."""
     least, most = load.slopes
     slope = roof_slopes(surface)
-    chosen: Bools = (slope >= least - 1e-9) & (slope <= most + 1e-9)
+    chosen: Bools = ((slope > least + 1e-9) | (least == 0.0)) & (slope <= most + 1e-9)
     if len(load.area):
         x, y = surface.plane.to_local(surface.vertices[surface.faces].mean(axis=1)).T[:2, :, None]
         a, b = (corners := np.array(load.area, dtype=float)).T

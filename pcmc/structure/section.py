@@ -42,7 +42,7 @@ class Zone:
     snow : load per plan area, besides the snow that the form was found under.
     wind : pressure, above 0 for suction on a roof.
     patches : that carry it; by default all that are no walls and under no other sheet.
-    slopes : it acts where the slope is between these two, degrees.
+    slopes : it acts on slopes over the first of these and up to the second, degrees; from 0, flat parts, too.
     area : corners [x, y] of a polygon in the plan that it acts within; by default everywhere.
     slides : two slopes, degrees: snow is whole up to the first, none from the second on, linear between.
     """
