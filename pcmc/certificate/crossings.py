@@ -79,7 +79,7 @@ def crossing_texts(table: pd.DataFrame, size: float) -> list[str]:
 
 @compiled
 def _crossing(X: Floats, F: Ints, boxes: Floats, clear: float) -> Ints:
-    """(k,2) the pairs of triangles that cross, of corners X (3 m,3) with the vertices F (m,3), by their boxes."""
+    """(k,2) the pairs of triangles that cross, with corners X (3 m,3), vertices F (m,3) and boxes."""
     leaves, last = len(boxes) // 2, -(-len(F) // LEAF)
     found, count, stack = np.empty((16, 2), dtype=np.int64), 0, np.empty(64, dtype=np.int64)
     for one in range(last):
