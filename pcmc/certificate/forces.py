@@ -24,7 +24,7 @@ from ..forces import cables
 from ..forces.cables import directions, pull_along
 from ..forces.elements import Points, add_values, energy_mesh
 from ..forces.pinching import standing_part
-from ..forces.triangles import add_weights, totals_and_gradient
+from ..forces.triangles import totals_and_gradient
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import segment_lengths
@@ -81,13 +81,12 @@ def support_forces(surface: Surface) -> Floats:
     cone to the point of Π, whose side is under no pressure.
     """
     X, mesh = surface.vertices, energy_mesh(surface)
-    tension = totals_and_gradient(mesh._replace(pressure=read_only(np.zeros(len(surface.patches)))), X)[2]
-    cable, weight, pressure = np.zeros((3, *X.shape))
-    add_values(cables.elements(surface, X), cable)
-    add_weights(surface, X, weight)
+    pull = totals_and_gradient(mesh._replace(pressure=read_only(np.zeros(len(surface.patches)))), X)[1]
+    add_values(cables.elements(surface, X), pull)
+    pressure = np.zeros(X.shape)
     pushed = mesh.pressure[mesh.patch, None, None] * Points.of(mesh, X).area
     np.add.at(pressure, mesh.faces, np.einsum("qk,eqd->ekd", mesh.shapes.value, pushed))
-    total = surface.folded(-tension - cable - weight + pressure)
+    total = surface.folded(pressure - pull)
     return apply_supports(surface, total.copy()) - total
 
 

@@ -115,7 +115,7 @@ def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
 def _area(surface: Surface, of: str | None) -> Measurement:
     """A_i, length²."""
     one = _chosen_patches(surface, of)
-    areas, _, slope = weighted(surface, one)
+    (areas, _, _), slope = weighted(surface, one)
     return Measurement(float(areas[one != 0.0].sum()), slope)
 
 

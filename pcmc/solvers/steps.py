@@ -214,7 +214,7 @@ class Stepper:
             return change
 
         def inverse(z: Floats) -> Floats:
-            return in_basis_then(second.bordered.solve, z)
+            return in_basis_then(second.bordered, z)
 
         if second.stiffness != 0.0:
             z, steps = inverse(right), 0
