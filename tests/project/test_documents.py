@@ -251,7 +251,7 @@ def test_files_have_the_mark_of_a_roof_that_is_not_in_order(tmp_path, monkeypatc
         drawn.append(mark)
         path.touch()
 
-    monkeypatch.setattr("pcmc.plot.draw", draw)
+    monkeypatch.setattr("pcmc.project.writing.draw", draw)
     cli.main(["solve", "roof.toml", "--allow-uncertified"])
     if mark:
         assert {suffix: read(Path(f"roof{suffix}")) for suffix, read in MARKED.items()} == dict.fromkeys(
