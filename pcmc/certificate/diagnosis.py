@@ -11,8 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import PINCHED
-from ..meshing.films import film_of
-from ..meshing.neighbour_swap import can_vanish
+from ..meshing.neighbour_swap import can_vanish, film_of
 from ..meshing.quality import edge_lengths, triangle_quality
 from ..surface import Surface
 from ..surface.geometry import face_areas, segment_lengths

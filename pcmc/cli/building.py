@@ -25,21 +25,8 @@ from ..structure.calculix import expect_program
 from ..structure.columns import column_text, columns_at_rest
 from ..structure.member_forces import cable_notes, cable_offers, sentences
 from . import arguments, reports
-from .arguments import (
-    MANY_FILES,
-    OUTPUT,
-    Build,
-    FileUnits,
-    Input,
-    MeshCheck,
-    SheetFormat,
-    ViewName,
-    amount,
-    count,
-    option,
-    parsed_number,
-    switch,
-)
+from .arguments import MANY_FILES, OUTPUT, Build, FileUnits, Input, MeshCheck, SheetFormat, ViewName
+from .options import amount, count, option, parsed_number, switch
 from .reports import working
 
 CSV = ".csv"
@@ -47,12 +34,9 @@ FAMILY = "Largest difference of edges within a family of triangles."
 PATTERN = "planar-quads along lines of curvature; quads or hexagons of a grid in plan."
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
 COST = "Cost of a family, as of its mould, and of a panel; adds NAME-costs.csv and .svg. Needs --change."
-PICTURE = "Picture to draw, coloured by family."
-MIRRORED = "alike: of one family; or apart."
 TOLERANCE = (
     "Largest difference of edges within a family of panels; adds the schedule. By default the project's."
 )
-HEIGHT = "Section at this height; may be repeated."
 TWO = "two numbers FAMILY,PANEL, 0 or more"
 LINE, FOUR = "Section along this line; may be repeated.", "four numbers X,Y,X,Y"
 TRUE_SIZE = "Draw every panel at true size, as a project may say, too; needs --tolerance."
@@ -61,7 +45,6 @@ DATE = "Date to print; by default the project's. No clock is read."
 THICKNESS = "Thickness of a patch; a bare VALUE applies to every patch that is not named."
 DENSITY = "Mass per volume; above 0, self-weight is a load."
 RUN = "Run CalculiX on each case and combination; by default as the project says."
-SNOW = "Load per plan area, besides the snow of the form."
 WIND = "Wind pressure on a patch, above 0 for suction on a roof; may be repeated."
 Tolerance = Annotated[float | None, amount("LENGTH", TOLERANCE)]
 
@@ -71,7 +54,7 @@ def panels_(
     file: Input,
     tolerance: Annotated[float | None, amount("LENGTH", FAMILY)] = None,
     output: Annotated[list[Path] | None, MANY_FILES] = None,
-    picture: Annotated[Path | None, option("PNG", PICTURE)] = None,
+    picture: Annotated[Path | None, option("PNG", "Picture to draw, coloured by family.")] = None,
     view: ViewName = "diagonal",
     pattern: Annotated[str | None, option("NAME", PATTERN)] = None,
     size: Annotated[float | None, amount("LENGTH", "Edge of the panels of a pattern.")] = None,
@@ -80,7 +63,7 @@ def panels_(
     sheet: SheetFormat = None,
     change: Annotated[float | None, amount("LENGTH", CHANGE)] = None,
     cost: Annotated[str | None, option("FAMILY,PANEL", COST)] = None,
-    mirror_images: Annotated[str, option("NAME", MIRRORED)] = "alike",
+    mirror_images: Annotated[str, option("NAME", "alike: of one family; or apart.")] = "alike",
     walls: Annotated[bool, switch("--walls", "Triangles of walls are panels, too.")] = False,
     build: Build,
 ) -> int:
@@ -110,7 +93,7 @@ def panels_(
         if pattern is None or size is None:
             text = "--pattern: needs a --size, and --size a --pattern: planar-quads, quads or hexagons"
             raise OptionError(text, what="--size", expected="a length")
-        return _net(file, units, files, picture, seen, sheet, build, (size, pattern, direction))
+        return _net(file, files, picture, seen, build, (size, pattern, direction, units, sheet))
     if tolerance is None:
         text = "--tolerance: panels of triangles need it; quads and hexagons need --pattern and --size"
         raise OptionError(text, what="--tolerance", expected="a length")
@@ -130,26 +113,26 @@ def panels_(
         outputs += schedule_paths(path) if suffix == CSV else [path]
         outputs += cost_paths(path) if suffix == CSV and prices is not None else []
     check_outputs(outputs, inputs=files_of(file))
-    options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
-    options["anyway"] = build.allow_uncertified
+    how: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": build.allow_uncertified}
     with working() as progress:
         roof = build.roof(arguments.load_project(file), progress)
         progress("sorting panels")
         if change is None:
-            schedule = roof.panels(tolerance, **options)
+            schedule = roof.panels(tolerance, **how)
         else:
 
             def callback(made: int, count: int) -> None:
                 progress(f"round {made}: {count} families")
 
-            fewer = roof.fewer_families(tolerance, change, callback=callback, **options)
+            fewer = roof.fewer_families(tolerance, change, callback=callback, **how)
             schedule = fewer.after
         works: list[Any] = []
-        writing = partial(write, surface=schedule.surface, units=roof.units)
         for path in files:
-            is_table = path.suffix.lower() == CSV
-            works += schedule_jobs(path, schedule) if is_table else [(path, writing)]
-            works += cost_jobs(path, fewer.costs(*prices)) if is_table and prices is not None else []
+            if path.suffix.lower() == CSV:
+                works += schedule_jobs(path, schedule)
+                works += cost_jobs(path, fewer.costs(*prices)) if prices is not None else []
+            else:
+                works.append((path, partial(write, surface=schedule.surface, units=roof.units)))
         if picture is not None:
             works.append((picture, partial(families, schedule, view=seen)))
         written = write_all(works, progress)
@@ -158,25 +141,17 @@ def panels_(
         print(f"\n{fewer}")
     if prices is not None:
         table = fewer.costs(*prices)
-        marked = table.assign(cheapest=table["cheapest"].map({True: "cheapest", False: ""}))
-        print(f"\n{marked.rename(columns={'cheapest': ''}).to_string(index=False, float_format='%.6g')}")
+        table[""] = table.pop("cheapest").map({True: "cheapest", False: ""})
+        print(f"\n{table.to_string(index=False, float_format='%.6g')}")
     return reports.ended(schedule.certificate.certified and roof.good, written)
 
 
 def _net(
-    file: Path,
-    units: str,
-    files: list[Path],
-    picture: Path | None,
-    seen: Any,
-    sheet: str | None,
-    build: Build,
-    wanted: tuple[float, str, float],
+    file: Path, files: list[Path], picture: Path | None, seen: Any, build: Build, about: tuple[Any, ...]
 ) -> int:
-    """Lay out quads or hexagons and write them."""
     for path in files:
         suffix_of(path, NET_SUFFIXES, "a net of panels")
-    size, pattern, direction = wanted
+    size, pattern, direction, units, sheet = about
     check_grid(pattern, direction)
     outputs = Output(picture=picture, view=seen, sheet=sheet or "A1").paths
     outputs += [one for path in files for one in table_paths(path, NET_TABLES)]
@@ -200,7 +175,7 @@ def draw_(
     units: FileUnits = "",
     sheet: SheetFormat = None,
     scale: Annotated[int | None, count("1 to this; by default it fits.")] = None,
-    height: Annotated[list[str] | None, option("Z", HEIGHT)] = None,
+    height: Annotated[list[str] | None, option("Z", "Section at this height; may be repeated.")] = None,
     line: Annotated[list[str] | None, option("X,Y,X,Y", LINE)] = None,
     tolerance: Tolerance = None,
     panel_sheets: Annotated[bool, switch("--panel-sheets", TRUE_SIZE)] = False,
@@ -214,14 +189,13 @@ def draw_(
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
     arguments.output_of(file, drawings=output)
-    heights = None if height is None else [parsed_number(text) for text in height]
     points = [arguments.numbers(text, "--line", FOUR, 4) for text in line or ()]
-    lines = None if line is None else [((a, b), (c, d)) for a, b, c, d in points]
+    options: dict[str, Any] = {"scale": scale, "heights": height and [parsed_number(text) for text in height]}
+    options["lines"] = line and [((a, b), (c, d)) for a, b, c, d in points]
     with working() as progress:
         roof = build.roof(arguments.load_project(file, units), progress)
         progress("drawing")
         documents = _documents(roof, sheet=sheet, tolerance=tolerance, panel_sheets=panel_sheets or None)
-        options = {"scale": scale, "heights": heights, "lines": lines}
         drawings = roof.drawing_set(documents, anyway=build.allow_uncertified, **options)
         written = write_all(drawings.files(*output), progress)
     print(f"{len(drawings.sheets)} sheets {drawings.sheets[0].format}", end="; ")
@@ -249,14 +223,13 @@ def report_(
     arguments.output_of(file, report=output)
     anyway = build.allow_uncertified
     with working() as progress:
-        project = arguments.load_project(file, units)
-        roof = build.roof(project, progress)
-        if force and roof.units.force not in ("", force):
-            own = roof.units.force
+        roof = build.roof(arguments.load_project(file, units), progress)
+        own = roof.units.force
+        if force and own not in ("", force):
             text = f"--force: the forces of {file.name} are in {own}, not in {force}; leave out --force"
             raise OptionError(text, what="--force", found=force, expected=own)
         progress("certifying")
-        roof = replace(roof, units=Units(roof.units.length, force or roof.units.force))
+        roof = replace(roof, units=Units(roof.units.length, force or own))
         require_certified(roof.shown.certificate, anyway)
     reports.mesh_check(roof, mesh_check)
     reports.margins(roof)
@@ -264,8 +237,7 @@ def report_(
         progress("laying out the pages")
         documents = _documents(roof, tolerance=tolerance, date=date)
         listed = {file.name: "project" if roof.result is not None else "surface"}
-        report = roof.report(documents, files=listed, anyway=anyway)
-        written = write_all([(output, report.write)], progress)
+        written = write_all([(output, roof.report(documents, files=listed, anyway=anyway).write)], progress)
     return reports.ended(roof.good, written)
 
 
@@ -283,7 +255,7 @@ class Model:
     poisson: Annotated[float | None, amount("VALUE", "Poisson's ratio, 0.3 by default.")] = None
     density: Annotated[float | None, amount("VALUE", DENSITY)] = None
     gravity: Annotated[float | None, amount("VALUE", "Length/s²; by default 9.81 m/s².")] = None
-    snow: Annotated[float | None, amount("VALUE", SNOW)] = None
+    snow: Annotated[float | None, amount("VALUE", "Load per plan area, besides the snow of the form.")] = None
     wind: Annotated[list[str] | None, option("NAME=VALUE", WIND)] = None
     cable_area: Annotated[float | None, amount("VALUE", "Section of the cables.")] = None
 
@@ -336,8 +308,8 @@ def structure(
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     if analysis is None:
-        lines = [*cable_notes(model), *sentences(model, model.units), *cable_offers(model)]
-        print(*lines, sep="\n", end="\n" * bool(lines))
+        for line in (*cable_notes(model), *sentences(model, model.units), *cable_offers(model)):
+            print(line)
         if model.bars:
             print(column_text(model, columns_at_rest(model), model.units))
         print(f"written: {output}; run it with: ccx {output.with_suffix('')}")

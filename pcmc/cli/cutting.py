@@ -15,7 +15,8 @@ from ..project import start_of
 from ..project.settings import of_material
 from ..project.writing import write_all
 from . import arguments, reports
-from .arguments import MANY_FILES, Build, FileUnits, Input, SheetFormat, ViewName, amount, count, option
+from .arguments import MANY_FILES, Build, FileUnits, Input, SheetFormat, ViewName
+from .options import amount, count, option
 from .reports import working
 
 WIDTH = "Width of the cloth: no strip is wider, with its allowances."
@@ -23,8 +24,6 @@ SEAM = "A seam from point to point along geodesics, instead of others there; may
 DIRECTION = "Of the warp in the plan, degrees from x; by default along the longer side of each sheet."
 COMPENSATION = "Percent by which the cloth is cut shorter along warp and weft."
 STIFFNESS = "Force per length of warp and weft, from which the compensation follows."
-ALLOWANCE = "Cloth added outside of seams."
-HEM = "Cloth added at rims; by default the allowance."
 NOTCHES = "Distance of the marks along seams, 0 for none; by default the mean width of strips."
 PICTURE = "Picture to draw: the strips on the roof, coloured by strain."
 
@@ -40,8 +39,8 @@ class Cutting:
     compensation: Annotated[str | None, option("WARP,WEFT", COMPENSATION)] = None
     stiffness: Annotated[str | None, option("WARP,WEFT", STIFFNESS)] = None
     poisson: Annotated[float | None, amount("NUMBER", "Contraction of the weft, 0.3 by default.")] = None
-    allowance: Annotated[float | None, amount("LENGTH", ALLOWANCE)] = None
-    hem: Annotated[float | None, amount("LENGTH", HEM)] = None
+    allowance: Annotated[float | None, amount("LENGTH", "Cloth added outside of seams.")] = None
+    hem: Annotated[float | None, amount("LENGTH", "Cloth added at rims; by default the allowance.")] = None
     notches: Annotated[float | None, amount("LENGTH", NOTCHES)] = None
 
     def of(self, own: CuttingOptions | None) -> CuttingOptions:

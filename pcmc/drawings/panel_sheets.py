@@ -13,8 +13,8 @@ import pandas as pd
 
 from ..base.arrays import Floats
 from ..panelling import PanelNet, Panels
-from ..panelling.flat import packed, turned_to_fit
 from ..panelling.planar import laid_flat_polygons
+from ..panelling.schedule import packed, turned_to_fit
 from ..surface.geometry import cross_2d
 from .sheet import WIDTH, Sheet, SheetLine, Text, corner, drawing_area, table_sheets
 

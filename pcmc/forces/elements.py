@@ -80,18 +80,6 @@ class Elements(NamedTuple):
     hessian: Callable[[], Floats]  # (e,k,k,3,3) ∂²/∂x_i∂x_j
     stiffness: Callable[[], Floats] | None = None  # (e,k,k) multiples of 1 in L; None where there are none
 
-    def times(self, factor: Floats) -> Elements:
-        """The elements with energies that are ``factor`` (e,) as large, without those of 0."""
-        some = slice(None) if factor.all() else np.flatnonzero(factor)
-        f, stiffness = factor[some], self.stiffness
-        return Elements(
-            self.vertices[some],
-            f * self.value[some],
-            lambda: f[:, None, None] * self.gradient()[some],
-            lambda: f[:, None, None, None, None] * self.hessian()[some],
-            None if stiffness is None else lambda: f[:, None, None] * stiffness()[some],
-        )
-
 
 def add_values(forces: Iterable[Elements], gradient: Floats | None = None) -> float:
     """The energy of all elements; their gradient is added to ``gradient`` (n,3) if that is given."""

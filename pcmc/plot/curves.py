@@ -70,7 +70,8 @@ def lines(
     figure, axes = new_axes(width, height, title, x, y, xscale, yscale)
     fits = fits or {}
     for k, (label, curve) in enumerate(curves.items()):
-        turn, color = k // len(CURVES), CURVES[k % len(CURVES)]  # how many times all colours are used already
+        color = CURVES[k % len(CURVES)]
+        turn = k // len(CURVES)  # how many times all colours are used already
         plain = {"linewidth": 1.1, "linestyle": "" if label in fits else ("-", "--")[turn % 2]}
         look = overlap_style(k, len(curves)) if dashes else plain
         look |= {"color": color, "marker": MARKERS[(k + turn) % len(MARKERS)] if markers else None}
