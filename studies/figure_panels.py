@@ -39,7 +39,7 @@ def curve_panels(
 
     rows = math.ceil(len(panels) / columns)
     figure = new(width, rows * (height + 62.0) + 138.0, pad=8.0)
-    axes, _ = grid(figure, len(panels), columns, sharex=True, sharey=True)
+    axes = grid(figure, len(panels), columns, sharex=True, sharey=True)
     across, up = (_range([pair[k] for curves in panels.values() for pair in curves.values()]) for k in (0, 1))
     labels = list(dict.fromkeys(label for curves in panels.values() for label in curves))
     looks = looks or {
@@ -75,7 +75,7 @@ def eigenvalue_panels(panels: Mapping[str, Curves], path: Path) -> None:
 
     columns = 4
     figure = new(1500, 370.0 * math.ceil(len(panels) / columns) + 60.0, pad=8.0)
-    axes, _ = grid(figure, len(panels), columns, sharex=True)
+    axes = grid(figure, len(panels), columns, sharex=True)
     labels = list(dict.fromkeys(label for curves in panels.values() for label in curves))
     looks = {
         label: {"color": CURVES[k], "marker": "os"[k % 2], "markersize": 2.6, "linewidth": 1.0}
@@ -135,7 +135,7 @@ def category_panels(
     colors = ListedColormap(list(categories.values()))
     rows = math.ceil(len(tables) / columns)
     figure = new(width, rows * width / columns + 120.0, pad=6.0)
-    axes, _ = grid(figure, len(tables), columns)
+    axes = grid(figure, len(tables), columns)
     for k, (place, (title, table)) in enumerate(zip(axes, tables.items(), strict=True)):
         numbers = np.vectorize(names.index, otypes=[int])(table)
         place.imshow(numbers, origin="lower", cmap=colors, vmin=-0.5, vmax=len(names) - 0.5, aspect="auto")

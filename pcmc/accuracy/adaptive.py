@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -143,7 +143,6 @@ def solve_to_accuracy(
 
     Parameters
     ----------
-    surface : the surface to start from.
     accuracy : the error bar wanted, by quantity, in its unit: ``{"height": 1e-3}`` or ``"height=1e-3"``.
         Quantities are those of the mesh check: height, area, volume, energy, reaction, thrust, reaction
         per length, lowest eigenvalue; with a patch, as in ``"height of north"``, that patch's alone.
@@ -177,13 +176,10 @@ def solve_to_accuracy(
     check_places(wanted, surface)
     if importlib.util.find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")
-    project: Projection | None = None
-    if callable(boundary):
-        project = boundary
-    elif validate.choice("boundary", boundary, BOUNDARIES) == "smooth":
-        project = onto_held_curves(surface, corners=vertex_numbers(corners, surface.n))
-    else:
-        vertex_numbers(corners, surface.n)
+    project = boundary if callable(boundary) else None
+    known = None if project else vertex_numbers(corners, surface.n)
+    if not project and validate.choice("boundary", boundary, BOUNDARIES) == "smooth":
+        project = onto_held_curves(surface, corners=known)
     given = {"boundary": boundary, "corners": corners}
     return _Search(wanted, accuracy_of, given, project, most_triangles, callback, options).run(surface)
 
@@ -198,7 +194,6 @@ def accuracies(given: Any) -> dict[str, float]:
     ...
     pcmc.base.errors.OptionError: unknown quantity 'hight'; did you mean 'height'? Known: height, ...
     """
-    expected = "a table such as {'height': 1e-3}, or a text such as 'height=1e-3'"
     wanted: dict[Any, Any] = dict(given) if isinstance(given, Mapping) else {}
     for part in given.split(",") if isinstance(given, str) else ():
         name, sign, value = part.rpartition("=")
@@ -209,12 +204,11 @@ def accuracies(given: Any) -> dict[str, float]:
         if not sign or not name.strip():
             validate.refuse("accuracy", part.strip(), "QUANTITY=NUMBER, such as height=1e-3")
     if not wanted:
+        expected = "a table such as {'height': 1e-3}, or a text such as 'height=1e-3'"
         validate.refuse("accuracy", given, expected)
-    found = {}
-    for name, value in wanted.items():
-        validate.choice("quantity", str(name).partition(" of ")[0], QUANTITIES)
-        found[str(name)] = validate.number("accuracy", value, above=0.0, where=str(name))
-    return found
+    for name in map(str, wanted):
+        validate.choice("quantity", name.partition(" of ")[0], QUANTITIES)
+    return {str(k): validate.number("accuracy", v, above=0.0, where=str(k)) for k, v in wanted.items()}
 
 
 def check_places(wanted: Mapping[str, float], surface: Surface) -> None:
@@ -226,11 +220,9 @@ def check_places(wanted: Mapping[str, float], surface: Surface) -> None:
 
 
 def goals_in(table: pd.DataFrame, wanted: Mapping[str, float]) -> dict[Goal, float]:
-    """The accuracy of each row of a mesh check's table that is asked for.
-
-    A quantity alone stands for that of the whole surface, and where there is none, as for heights, for
-    those of all patches. With a patch it stands for all curves of that patch, too.
-    """
+    """The accuracy of each row of a mesh check's table that is asked for. A quantity alone stands for that of
+    the whole surface, and where there is none, as for heights, for those of all patches. With a patch it
+    stands for all curves of that patch, too."""
     goals: dict[Goal, float] = {}
     for name, accuracy in wanted.items():
         quantity, _, patch = name.partition(" of ")
@@ -246,8 +238,7 @@ def goals_in(table: pd.DataFrame, wanted: Mapping[str, float]) -> dict[Goal, flo
     return goals
 
 
-@dataclass(frozen=True, eq=False)
-class _Round:
+class _Round(NamedTuple):
     """A surface at rest, its check, and the quantities wanted with their bars."""
 
     result: Result
@@ -255,11 +246,7 @@ class _Round:
     goals: Mapping[Goal, float]
     values: pd.DataFrame
     excess: float  # the largest error bar over its accuracy
-
-    @property
-    def record(self) -> dict[str, Any]:
-        """The numbers for the history."""
-        return {"triangles": self.result.surface.m, "verdict": self.check.verdict.name.lower()}
+    record: Mapping[str, Any]  # the numbers for the history
 
 
 @dataclass(eq=False)
@@ -281,47 +268,44 @@ class _Search:
         status, detail = AccuracyStatus.ROUNDS, f"after {ROUNDS} rounds"
         try:
             for _ in range(ROUNDS):
-                if ended := self._unsolved(result) or self._ended(self._round(result)):
+                ended: End | None = None
+                if result.status is Status.STOPPED:
+                    ended = AccuracyStatus.STOPPED, ""
+                elif not result.converged:
+                    text = f"on {result.surface.m} triangles: {result.message}"
+                    ended = AccuracyStatus.NOT_AT_REST, text
+                if ended := ended or self._ended(self._round(result)):
                     status, detail = ended
                     break
                 result = self._next(self.rounds[-1])
         except (StopIteration, KeyboardInterrupt) as error:
             stop_requested(error)
             status, detail = AccuracyStatus.STOPPED, ""
-        history = [r.values.assign(round=k + 1, **r.record) for k, r in enumerate(self.rounds)]
-        rows = pd.concat(history, ignore_index=True) if history else pd.DataFrame()
-        surfaces = tuple(r.result.surface for r in self.rounds)
+        rows = [pd.DataFrame(), *(r.values.assign(round=k, **r.record) for k, r in enumerate(self.rounds, 1))]
+        history = pd.concat(rows[1:] or rows, ignore_index=True), tuple(r.result.surface for r in self.rounds)
         if not self.rounds:
-            return AccurateResult(status, first, None, pd.DataFrame(), rows, surfaces, detail)
+            return AccurateResult(status, first, None, pd.DataFrame(), *history, detail)
         last = self.rounds[-1]
-        return AccurateResult(status, last.result, last.check, last.values, rows, surfaces, detail)
-
-    def _unsolved(self, result: Result) -> End | None:
-        if result.converged:
-            return None
-        if result.status is Status.STOPPED:
-            return AccuracyStatus.STOPPED, ""
-        return AccuracyStatus.NOT_AT_REST, f"on {result.surface.m} triangles: {result.message}"
+        return AccurateResult(status, last.result, last.check, last.values, *history, detail)
 
     def _round(self, result: Result) -> _Round:
         """Check the mesh of a surface at rest; bars have what the first mesh's curves leave in doubt, too."""
         first = self.rounds[0].check if self.rounds else None
         given = self.given if first is None else {"boundary": self.project or "polygon"}
         check = check_mesh(result, **given)
-        doubts: dict[str, float] = {}
-        for (quantity, _), doubt in (first.curve_doubts if first else {}).items():
-            doubts[quantity] = max(doubt, doubts.get(quantity, 0.0))
-        goals = goals_in(check.table, self.wanted)
+        goals, doubts = goals_in(check.table, self.wanted), first.curve_doubts if first else {}
+        most = [[max([0.0, *(d for (q, _), d in doubts.items() if q == quantity)])] for quantity, _ in goals]
         names = list(zip(check.table["quantity"], check.table["of"], strict=True))
         rows = check.table.iloc[[names.index(goal) for goal in goals]].reset_index(drop=True)
         values = rows.assign(accuracy=list(goals.values()))
-        values[["error", "limit_error"]] += np.array([[doubts.get(quantity, 0.0)] for quantity, _ in goals])
+        values[["error", "limit_error"]] += np.array(most)
         bar = values["error" if self.accuracy_of == "mesh" else "limit_error"]
-        here = _Round(result, check, goals, values, float((bar / values["accuracy"]).max()))
-        self.rounds.append(here)
+        excess = float((bar / values["accuracy"]).max())
+        record = {"triangles": result.surface.m, "verdict": check.verdict.name.lower()}
+        self.rounds.append(_Round(result, check, goals, values, excess, record))
         if self.callback is not None:
-            self.callback({"round": len(self.rounds), **here.record, "excess": here.excess})
-        return here
+            self.callback({"round": len(self.rounds), **record, "excess": excess})
+        return self.rounds[-1]
 
     def _ended(self, here: _Round) -> End | None:
         """The end of the search, if this is the last round."""
@@ -329,10 +313,9 @@ class _Search:
             return AccuracyStatus.REACHED, ""
         for goal, accuracy in here.goals.items():
             if (doubt := self.rounds[0].check.curve_doubts.get(goal, 0.0)) > accuracy:
-                return AccuracyStatus.CURVES, (
-                    f"the first mesh has only points of them, and the {row_name(*goal)} may be {doubt:.2g}"
-                    " off for that; draw them in a plan, start from more points, or give boundary= a function"
-                )
+                text = f"the first mesh has only points of them, and the {row_name(*goal)} may be {doubt:.2g}"
+                hint = "draw them in a plan, start from more points, or give boundary= a function"
+                return AccuracyStatus.CURVES, f"{text} off for that; {hint}"
         limits = [r.check.persists and math.isfinite(r.excess) for r in self.rounds[-PATIENCE:]]
         if len(limits) == PATIENCE and not any(limits):
             rows = here.values[~np.isfinite(here.values["error"])]
@@ -352,10 +335,8 @@ class _Search:
 
     def _next(self, here: _Round) -> Result:
         """The surface on a mesh with equal shares of the error; if it does not come to rest there, on the
-        check's finer mesh.
-
-        With equal shares N triangles have the error (Σ √η)² / N, the m triangles here have Σ η.
-        """
+        check's finer mesh. With equal shares N triangles have the error (Σ √η)² / N, the m triangles here
+        have Σ η."""
         surface, finer = here.result.surface, here.check.surfaces[1:2]
         if finer:
             shares = error_shares(surface, finer[0], here.goals)

@@ -34,7 +34,7 @@ from ..stability.equilibrium import Equilibrium
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import lowest
 from ..surface import Surface
-from ..surface.geometry import face_areas, segment_lengths
+from ..surface.geometry import face_areas, segment_lengths, vertex_sums
 from ..surface.supports import apply_supports
 from .quantities import summit
 
@@ -69,12 +69,10 @@ def error_shares(coarse: Surface, fine: Surface, goals: Mapping[Goal, float]) ->
     >>> len(shares) == cap.m, bool(shares.min() > 0.02 * shares.max())
     (True, True)
     """
-    total = np.zeros(len(coarse.topology.edges))
-    for shares, accuracy in zip(_edge_shares(coarse, fine, goals), goals.values(), strict=True):
-        total += shares / accuracy
-    edge_of_face = coarse.topology.edge_of_face
-    faces = np.bincount(edge_of_face.ravel(), minlength=len(total))
-    return np.asarray((total / np.maximum(faces, 1))[edge_of_face].sum(axis=1))
+    topo, shares = coarse.topology, zip(_edge_shares(coarse, fine, goals), goals.values(), strict=True)
+    total = sum((share / accuracy for share, accuracy in shares), np.zeros(len(topo.edges)))
+    faces = np.bincount(topo.edge_of_face.ravel(), minlength=len(total))
+    return np.asarray((total / np.maximum(faces, 1))[topo.edge_of_face].sum(axis=1))
 
 
 def evenness(shares: Floats) -> float:
@@ -101,8 +99,8 @@ def size_field(surface: Surface, shares: Floats, triangles: float) -> Floats:
     excess = root * triangles / root.sum() if root.any() else np.ones(surface.m)
     factor = excess**-0.5 * np.maximum(1.0, excess / SINGULAR) ** -0.5
     length = np.sqrt(areas * 4.0 / sqrt(3.0)) * np.clip(factor, FINER, COARSER)
-    count = np.maximum(np.bincount(F.ravel(), minlength=surface.n), 1)
-    wanted = np.exp(np.bincount(F.ravel(), np.repeat(np.log(length), 3), surface.n) / count)
+    log, count = vertex_sums(np.column_stack([np.log(length), np.ones(surface.m)]), F, surface.n).T
+    wanted = np.exp(log / np.maximum(count, 1.0))
     for _ in range(6):  # limits to growth make edges shorter and triangles more
         size = limit_growth(surface.vertices, surface.topology.edges, wanted, GROWTH)
         wanted *= sqrt(triangles_for(areas, size[F].mean(axis=1)).sum() / triangles)
@@ -120,8 +118,7 @@ def _edge_shares(coarse: Surface, fine: Surface, goals: Iterable[Goal]) -> Itera
 
     def missing(field: Floats) -> Floats:
         """(e,) the size of the interpolation error of a field of motions, in the motion space."""
-        error = at.space.project(_interpolation_error(coarse, field))
-        return np.asarray(np.linalg.norm(error[coarse.n :], axis=1))
+        return np.linalg.norm(at.space.project(_interpolation_error(coarse, field))[coarse.n :], axis=1)
 
     def at_held(force: Floats) -> Floats:
         """(e,) the work of a force (n,3) along the errors at held vertices."""
@@ -145,9 +142,8 @@ def _edge_shares(coarse: Surface, fine: Surface, goals: Iterable[Goal]) -> Itera
 
 def _interpolation_error(coarse: Surface, field: Floats) -> Floats:
     """(n,3) the field at each new vertex less the mean of the ends of its edge; 0 at the others."""
-    start, end = coarse.topology.edges.T
     error = np.zeros_like(field)
-    error[coarse.n :] = field[coarse.n :] - 0.5 * (field[start] + field[end])
+    error[coarse.n :] = field[coarse.n :] - field[coarse.topology.edges].mean(axis=1)
     return error
 
 
@@ -201,6 +197,4 @@ def _along(surface: Surface, field: Floats, second: bool = False) -> Floats:
     shifts = (step, -step, 0.0) if second else (step, -step)
     places = (surface.vertices + s * field for s in shifts)
     ahead, back, *here = (energy_and_gradient(surface, X, supports=False)[1] for X in places)
-    if not second:
-        return np.asarray((ahead - back) / (2.0 * step))
-    return np.asarray((ahead + back - 2.0 * here[0]) / step**2)
+    return (ahead + back - 2.0 * here[0]) / step**2 if second else (ahead - back) / (2.0 * step)

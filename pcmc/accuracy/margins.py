@@ -1,4 +1,13 @@
-"""``margin``: how far an equilibrium is from the edge, what ends its stability, with an error bar."""
+"""``margin``: how far an equilibrium is from the edge, what ends its stability, with an error bar.
+
+As a target its slopes by tensions and loads have a closed form. At a fold the equations Bᵀ∇E = 0 have the
+left null vector φ, the mode, as they are symmetric. Along a change dμ of a tension or a load the fold moves
+so that ⟨φ, ∂∇E/∂λ⟩ dλ + ⟨φ, ∂∇E/∂μ⟩ dμ = 0, whatever the shape:
+
+    dλ/dμ = - ⟨φ, ∂∇E/∂μ⟩ / ⟨φ, ∂∇E/∂λ⟩
+
+(Govaerts 2000, ch. 4). A number that λ multiplies changes its ∂μ by λ, too.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +15,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -14,16 +23,18 @@ import numpy.typing as npt
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import PcmcError, SurfaceError
-from ..base.tolerances import EVENT_ACCURACY
+from ..base.errors import OptionError, PcmcError, SurfaceError
+from ..base.tolerances import AT_REST, EVENT_ACCURACY
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict, certify
 from ..certificate.balance import pressures_left_over
 from ..certificate.certificate import certified
 from ..certificate.diagnosis import worst_face
+from ..certificate.measures import Measurement
 from ..certificate.quantities import dimension_of
 from ..certificate.verdict import only_coarse
 from ..forces.cables import heavy_cable_pulls
+from ..forces.functional import by_rates
 from ..forces.pinching import standing_part
 from ..forces.triangles import heavy_triangle_pulls
 from ..solvers import solve_once
@@ -76,10 +87,8 @@ def find_end(
     surface: Surface, varied: Varied, index: int, most: float, callback: Callback | None = None
 ) -> End:
     """Follow the equilibria of a surface of this index until it rises, λ turns, or a part is compressed.
-
     Where the contact with Π changes on the last step, too, that is repeated in smaller ones, which tell the
-    two apart. Raises KeyboardInterrupt where ``callback`` raises StopIteration, or for Ctrl-C.
-    """
+    two apart. Raises KeyboardInterrupt where ``callback`` raises StopIteration, or for Ctrl-C."""
     sense, contacts = (1.0 if varied.more else -1.0), list[float]()
     branch, step = _follow(surface, varied, index, most, callback, LARGEST), LARGEST
     while True:
@@ -94,6 +103,7 @@ def find_end(
         step = SHORTER * min(end - begin, step)
         branch = _follow(branch.surfaces[len(branch.points) - 2], varied, index, most, callback, step)
     squeezed, there, detail = _compression(branch), branch.last, ""
+    kind, factor = MarginEnd.NONE, float(branch.points.parameter.iloc[-1])
     if squeezed is not None and (ended.empty or sense * (squeezed - ended.parameter.iloc[0]) <= 0.0):
         kind, factor = MarginEnd.COMPRESSION, squeezed
     elif len(ended):
@@ -104,10 +114,8 @@ def find_end(
         kind = MarginEnd.CONTACT if touched else MarginEnd.BIFURCATION
         if event.kind == "fold" or event.along_branch >= ALONG:
             kind = MarginEnd.FOLD
-    elif branch.ending is Ending.REACHED:
-        kind, factor = MarginEnd.NONE, float(branch.points.parameter.iloc[-1])
-    else:
-        factor, detail = float(branch.points.parameter.iloc[-1]), branch.detail
+    elif branch.ending is not Ending.REACHED:
+        detail = branch.detail
         # a solve a little beyond its last point tells what a branch that was lost ends by
         beyond = varied.direction.line(there).surface_at(there, factor + sense * BEYOND * max(factor, 1.0))
         down = solve_once(beyond).certificate.verdict is Verdict.WALL_DOWN
@@ -144,18 +152,13 @@ def _follow(
 
 
 def _compression(branch: Branch) -> float | None:
-    """λ at which α + w z̄ of a triangle or τ + g z̄ of a cable reaches 0, linear between the last two points.
-
-    None if none does.
-    """
-    if len(branch.points) < 2:
-        return None
+    """λ at which α + w z̄ of a triangle or τ + g z̄ of a cable reaches 0, linear between the last two points;
+    None if none does."""
     parameters, surfaces = branch.points.parameter.tolist()[-2:], [*branch.surfaces.values()][-2:]
-    ends = []
-    for pulls in HEAVY:
+    ends = list[float]()
+    for pulls in HEAVY if len(branch.points) > 1 else ():
         before, after = (pulls(surface).min(initial=np.inf) for surface in surfaces)
-        if after <= 0.0:
-            ends.append(float(np.interp(0.0, [after, before], parameters[::-1])))
+        ends += [float(np.interp(0.0, [after, before], parameters[::-1]))] if after <= 0.0 else []
     return min(ends, key=lambda end: abs(end - parameters[0]), default=None)
 
 
@@ -236,7 +239,6 @@ def margin(
 
     Parameters
     ----------
-    surface : at rest.
     what : ``"pressure"``, ``"snow"``, ``"weight"`` and ``"tension"`` (both with cables), ``"cable"``,
         ``"cable_weight"`` or ``"volume"``: all of a kind in proportion; or one of them, such as
         ``"pressure of hall"``; the name of a patch or cable alone means its tension. What is 0 now is added,
@@ -246,8 +248,7 @@ def margin(
         largest pressure, or tension over size.
     meshes : on so many meshes in all, each once refined from the one before, for the bar.
     corners : as of ``pcmc.check_mesh``.
-    callback : called with a ``Progress`` at each step. Where it raises StopIteration, the search ends with
-        KeyboardInterrupt.
+    callback : called with a ``Progress`` at each step; StopIteration in it ends with KeyboardInterrupt.
     certificate : of the surface, if it is known.
 
     Raises
@@ -295,7 +296,9 @@ def margin(
             doubt = "" if check.persists else f"the mesh check finds that the roof {check.verdict.value}"
         except PcmcError as error:
             ends, doubt = ends[:1], str(error)
-        notes.append(f"no bar: {doubt}" if doubt else _shown(ends[1:], unit))
+        words = [(one, one.ends_by.value.partition(":")[0]) for one in ends[1:]]
+        shown = [f"on {one.surface.m} triangles {unit * one.factor:.4g} ({why})" for one, why in words]
+        notes.append(f"no bar: {doubt}" if doubt else ", ".join(shown))
     numbers = np.array([[unit * one.factor] for one in ends])
     alike = {one.ends_by in OPEN for one in ends} == {False}
     bars = extrapolate(numbers if alike else numbers[:1], np.array([EVENT_ACCURACY * abs(numbers[0, 0])]))
@@ -307,30 +310,11 @@ def margin(
     if certificate.symmetric_in:
         notes.append(f"among shapes symmetric in {', '.join(certificate.symmetric_in)}")
     kinds = {dimension_of(kind) for kind, _ in varied.parts}
-    return Margin(
-        what=varied.what,
-        more=varied.more,
-        factor=math.nan if varied.unit else end.factor,
-        values=varied.at(end.factor),
-        bar=float(bars.error[0]),
-        limit=float(bars.limit[0]),
-        limit_bar=float(bars.limit_error[0]),
-        ends_by=end.ends_by,
-        detail="; ".join(filter(None, (end.detail, *notes))),
-        surface=end.surface,
-        mode=mode,
-        where=_where(end, mode),
-        index=index,
-        dimension=kinds.pop() if len(kinds) == 1 else "",
-    )
-
-
-def _shown(ends: list[End], unit: float) -> str:
-    """The ends on finer meshes in words."""
-    return ", ".join(
-        f"on {end.surface.m} triangles {unit * end.factor:.4g} ({end.ends_by.value.partition(':')[0]})"
-        for end in ends
-    )
+    factor, dimension = math.nan if varied.unit else end.factor, kinds.pop() if len(kinds) == 1 else ""
+    bar, limit, limit_bar = (float(value[0]) for value in (bars.error, bars.limit, bars.limit_error))
+    about = varied.what, varied.more, factor, varied.at(end.factor), bar, limit, limit_bar, end.ends_by
+    detail = "; ".join(filter(None, (end.detail, *notes)))
+    return Margin(*about, detail, end.surface, mode, _where(end, mode), index, dimension)
 
 
 def _mode(end: End, index: int) -> Floats:
@@ -354,7 +338,7 @@ def _where(end: End, mode: Floats) -> str:
         vectors, areas = vertex_area_vectors(surface.vertices, surface.faces[surface.patch_of_face == k])
         through[k], size[k] = (mode * vectors).sum(), motion @ areas
     near = np.unique(surface.patch_of_face[(surface.faces == most).any(axis=1)])
-    largest = int(roof[size[roof].argmax()]) if len(roof) else int(near[0])
+    largest = int(size.argmax()) if size.any() else int([*roof, near[0]][0])
     turns = end.ends_by is MarginEnd.BIFURCATION  # to either side
     if abs(through[largest]) >= INFLATES * size[largest] > 0.0 and not (turns and len(near) > 1):
         part = "the roof" if len(roof) == 1 else repr(surface.patches[largest].name)
@@ -362,3 +346,37 @@ def _where(end: End, mode: Floats) -> str:
     names = " | ".join(surface.patches[k].name for k in near[:3]) + " …" * (len(near) > 3)
     part = f"the junction {names}" if len(near) > 1 else repr(surface.patches[near[0]].name)
     return f"{part} sways to one side, most near {point_text(surface.vertices[most], surface.size)}"
+
+
+@lru_cache(maxsize=4)
+def _known(surface: Surface, what: str) -> Margin | None:
+    """Of the last surfaces, as value and slopes are asked for one after the other; None if not at rest."""
+    certificate = certify(surface)
+    at_rest = certificate.residual <= AT_REST
+    return margin(surface, what, meshes=1, certificate=certificate) if at_rest else None
+
+
+def measured_margin(surface: Surface, of: str | None) -> Measurement:
+    """The factor of ``pcmc.margin``, on this mesh alone; constant without an end, NaN if not at rest."""
+    what = of or "pressure"
+    if surface.rooms:
+        text = f"margin of {what}: as a target it needs rooms of given pressures, not volumes"
+        raise OptionError(text, what="of", found=what)
+    varied = Varied.of(surface, what)
+    if varied.unit:
+        raise OptionError(f"margin of {what}: it is 0 now, so it has no factor", what="of", found=what)
+    found, still = _known(surface, what), np.zeros_like(surface.vertices)
+    if found is None or not len(found.mode):
+        return Measurement(math.nan if found is None else found.factor, still)
+    if found.ends_by is not MarginEnd.FOLD:
+        text = f"margin of {what}: it ends by a {found.ends_by.name.lower()}, whose slopes are not known;"
+        raise OptionError(f"{text} as a target it has to end by a fold", what="of", found=what)
+    end, phi, slopes = found.surface, found.mode, dict[str, Floats]()
+    along = float((phi * varied.direction.line(end).gradient(end, end.vertices)).sum())
+    walls = {(k, p.name) for k, _ in varied.parts if varied.what == k for p in end.patches if p.wall}
+    for kind in ("tension", "pressure", "weight", "snow", "cable", "cable_weight"):
+        names = [part.name for part in (end.cables if "cable" in kind else end.patches)]
+        across = np.array([(phi * by_rates(end, {f"{kind}s": one})[1]).sum() for one in np.eye(len(names))])
+        multiplied = [(kind, name) in {*varied.parts, *walls} for name in names]
+        slopes[f"{kind}s"] = -across * np.where(multiplied, found.factor, 1.0) / along
+    return Measurement(found.factor, still, slopes)

@@ -136,9 +136,9 @@ def check_mesh(
         ``"polygon"``, on the straight edges; or a function (k,3) → (k,3) that puts points of the edges
         on the exact curve. Vertices that slide on Π stay on it.
     corners : vertices (k,) at which held curves have corners for sure, also where they turn by less.
-    callback : called with a ``Progress`` after each step of the solver. Where it raises StopIteration,
-        the check ends with KeyboardInterrupt, as with Ctrl-C.
-    most_triangles : the most that the finest mesh may have.
+    callback : called with a ``Progress`` after each step of the solver. StopIteration in it, or Ctrl-C, ends
+        the check with KeyboardInterrupt.
+    most_triangles : of the finest mesh.
 
     Raises
     ------
@@ -171,21 +171,16 @@ def check_mesh(
     sharp = np.union1d(known, held_corners(first))
     finest = first.m * 4 ** (meshes - 1)
     if finest > most_triangles:
-        raise OptionError(
-            f"the finest of {meshes} meshes would have {finest} triangles, more than most_triangles ="
-            f" {most_triangles}; ask for fewer meshes, or raise most_triangles=",
-            what="meshes",
-            found=finest,
-            expected=most_triangles,
-        )
+        text = f"the finest of {meshes} meshes would have {finest} triangles, more than most_triangles ="
+        text += f" {most_triangles}; ask for fewer meshes, or raise most_triangles="
+        raise OptionError(text, what="meshes", found=finest, expected=most_triangles)
     certificate = surface.certificate if isinstance(surface, Result) else certify(surface)
     if certificate.index is None:
         message = f"check_mesh needs a surface at rest; solve it first ({certificate.verdict.value}"
         message += f"; {certificate.detail})" if certificate.detail else ")"
         raise SurfaceError(message, what="surface", found=certificate.residual)
     solved = partial(_solved, callback=callback, stable=certificate.index == 0)
-    surfaces, certificates = [first], [certificate]
-    finding, order = None, None
+    surfaces, certificates, finding, order = [first], [certificate], None, None
     for _ in range(meshes - 1):
         start = _refined(surfaces[-1], boundary, sharp)
         result = solved(start)
@@ -267,17 +262,9 @@ def _table(
     value = np.array([reading.value for reading in rows[0]])
     doubt = np.array([doubts.get((reading.quantity, reading.of), 0.0) for reading in rows[0]])
     result = extrapolate(estimates, rounding, value, shape_order=order, doubt=doubt)
-    return pd.DataFrame(
-        {
-            "quantity": [reading.quantity for reading in rows[0]],
-            "of": [reading.of for reading in rows[0]],
-            "value": value,
-            "error": result.error,
-            "limit": result.limit,
-            "limit_error": result.limit_error,
-            "order": result.order,
-        }
-    )
+    table = pd.DataFrame([(one.quantity, one.of) for one in rows[0]], columns=["quantity", "of"])
+    table = table.assign(value=value, error=result.error, limit=result.limit)
+    return table.assign(limit_error=result.limit_error, order=result.order)
 
 
 def row_name(quantity: str, of: str) -> str:
@@ -287,17 +274,13 @@ def row_name(quantity: str, of: str) -> str:
 
 def _text_table(table: pd.DataFrame, units: Units) -> str:
     """Lines with as many digits as the bars let stand."""
-    lines = pd.DataFrame(
-        {
-            "quantity": table.quantity,
-            "of": table.of,
-            "on this mesh": list(map(with_bar, table.value, table.error)),
-            "limit": list(map(with_bar, table.limit, table.limit_error)),
-            "unit": [units.behind(dimension_of(quantity)).strip() for quantity in table.quantity],
-            "order": ["-" if math.isnan(p) else f"{p:.1f}" for p in table.order],
-        }
-    )
-    return lines.drop(columns=[] if units else ["unit"]).to_string(index=False)
+    lines = table[["quantity", "of"]].copy()
+    lines["on this mesh"] = list(map(with_bar, table.value, table.error))
+    lines["limit"] = list(map(with_bar, table.limit, table.limit_error))
+    if units:
+        lines["unit"] = [units.behind(dimension_of(quantity)).strip() for quantity in table.quantity]
+    lines["order"] = ["-" if math.isnan(p) else f"{p:.1f}" for p in table.order]
+    return lines.to_string(index=False)
 
 
 def with_bar(value: float, bar: float, unit: str = "") -> str:

@@ -55,10 +55,8 @@ class Finding(NamedTuple):
 
 
 def lost(start: Surface, result: Result) -> Finding:
-    """The finding where the solver reaches no equilibrium from the start on a finer mesh.
-
-    The place is that of the start: where the solver ends, a surface may be far away.
-    """
+    """The finding where the solver reaches no equilibrium from the start on a finer mesh. The place is that
+    of the start: where the solver ends, a surface may be far away."""
     surface = result.surface
     worst, quality = worst_face(surface, standing_part(surface).walls.pinchable)
     if result.status in RUNNING_AWAY:
@@ -79,11 +77,10 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
     first = certificates[0]
     for surface, certificate in zip(surfaces[1:], certificates[1:], strict=True):
         if certificate.index != first.index:
-            place = _where_softest(surface, certificate)
             becomes = "stable" if certificate.index == 0 else f"a saddle of index {certificate.index}"
             was = "stable" if first.index == 0 else f"of index {first.index}"
             reason = f"on {surface.m} triangles it is {becomes}, here {was}; the motion that turns is largest"
-            return _at(MeshVerdict.CHANGES, surface, reason, place)
+            return _at(MeshVerdict.CHANGES, surface, reason, _where_softest(surface, certificate))
     size = max(float(np.ptp(surfaces[0].plane.height(surfaces[0].vertices))), FLAT * surfaces[0].size)
     moves = [_moves(a, b) for a, b in pairwise(surfaces)]
     for (surface, fine), move in zip(pairwise(surfaces), moves, strict=True):
@@ -94,35 +91,25 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
             reason = f"on {fine.m} triangles it is another shape, {far:.3g} away"
             return _at(MeshVerdict.CHANGES, surface, reason, place)
     if _order(surfaces, moves) < 0.0:
-        before, last = (_mean(move) for move in moves[-2:])
-        place = surfaces[-2].vertices[int(moves[-1].argmax())]
-        moved = f"by {before:.2g}, then {last:.2g} in the mean"
+        moved = "by {:.2g}, then {:.2g} in the mean".format(*map(_mean, moves[-2:]))
         reason = f"each finer surface is farther from the last one ({moved}), most"
-        return _at(MeshVerdict.HELD_BY_MESH, surfaces[-1], reason, place)
+        return _at(MeshVerdict.HELD_BY_MESH, surfaces[-1], reason, surfaces[-2].vertices[moves[-1].argmax()])
     return _falling_line(surfaces) or _stability(surfaces, certificates)
 
 
 def shape_order(surfaces: Sequence[Surface]) -> float:
-    """Observed order of the surface itself: log2 of the last two mean moves from mesh to mesh.
-
-    Infinite with fewer than three meshes, or where the last move is none beside the error of the shape: a
-    coarse mesh may be at rest on the smooth surface itself, so that first moves are small and later ones
-    larger. The error is how far the last refinement's new vertices are from the middles of their edges.
-    At most 3/2 where a junction rests on its bottom, or will on finer meshes: that where its rest ends.
-    """
+    """Observed order of the surface itself: log2 of the last two mean moves from mesh to mesh. Infinite with
+    fewer than three meshes, or where the last move is none beside the error of the shape: a coarse mesh may
+    be at rest on the smooth surface itself, so that first moves are small and later ones larger. The error is
+    how far the last refinement's new vertices are from the middles of their edges. At most 3/2 where a
+    junction rests on its bottom, or will on finer meshes: that where its rest ends."""
     order = _order(surfaces, [_moves(a, b) for a, b in pairwise(surfaces[-3:])])
-    return min(order, CONTACT) if len(surfaces) > 2 and _comes_to_rest(*surfaces[-2:]) else order
-
-
-def _comes_to_rest(coarse: Surface, fine: Surface) -> bool:
-    """Whether a junction rests on its bottom, or may on finer meshes: at an end it rises less than before.
-
-    There it rises as c s - k s log(1/s): by k log 2 less on each finer mesh, until it rests.
-    """
-    if coarse.periodic:
-        return False
-    slopes = [_end_slopes(surface)[: coarse.n] for surface in (coarse, fine)]
-    return bool(standing_part(fine).resting.any() or (slopes[1] < slopes[0]).any())
+    if len(surfaces) < 3 or surfaces[0].periodic:
+        return order
+    # at an end it rises as c s - k s log(1/s): by k log 2 less on each finer mesh, until it rests
+    before, last = (_end_slopes(surface)[: surfaces[-2].n] for surface in surfaces[-2:])
+    rests = standing_part(surfaces[-1]).resting.any() or (last < before).any()
+    return min(order, CONTACT) if rests else order
 
 
 def _end_slopes(surface: Surface) -> Floats:
@@ -140,7 +127,7 @@ def _end_slopes(surface: Surface) -> Floats:
 def _order(surfaces: Sequence[Surface], moves: Sequence[Floats]) -> float:
     if len(surfaces) < 3:
         return np.inf
-    (before, last), (coarse, fine) = (_mean(move) for move in moves[-2:]), surfaces[-2:]
+    (before, last), (coarse, fine) = map(_mean, moves[-2:]), surfaces[-2:]
     middles = coarse.vertices[coarse.topology.edges].mean(axis=1)
     error = _mean(np.linalg.norm(fine.vertices[coarse.n :] - middles, axis=1))
     return float(np.log2(before / last)) if last > STILL * fine.size + MATTERS * error else np.inf
@@ -158,15 +145,12 @@ def _moves(coarse: Surface, fine: Surface) -> Floats:
 
 
 def _falling_line(surfaces: Sequence[Surface]) -> Finding | None:
-    """The finding where a line in which walls meet leans ever more at its foot: it will lie down.
-
-    At its foot the walls are planes through their bottoms and the line, and must balance. With all bottoms on
-    one side of a straight line, as in a T, they cannot: each finer mesh sees it lean more, by about as much.
-    """
+    """The finding where a line in which walls meet leans ever more at its foot: it will lie down. At its foot
+    the walls are planes through their bottoms and the line, and must balance. With all bottoms on one side of
+    a straight line, as in a T, they cannot: each finer mesh sees it lean more, by about as much."""
     if len(surfaces) < 3:
         return None
-    first = surfaces[0]
-    leans = np.zeros((len(surfaces), first.n))  # degrees from Π's normal at the feet
+    leans = np.zeros((len(surfaces), surfaces[0].n))  # degrees from Π's normal at the feet
     for lean, surface in zip(leans, surfaces, strict=True):
         lines = [curve for curve in surface.topology.junctions if surface.walls[list(curve.sheets)].all()]
         for end, beside in (pair for line in lines for pair in line.ends):
@@ -181,12 +165,12 @@ def _falling_line(surfaces: Sequence[Surface]) -> Finding | None:
     foot = int(np.where(falling, step, 0.0).argmax())
     values = ", ".join(f"{lean[foot]:.0f}°" for lean in leans)
     reason = f"the line in which walls meet leans ever more at its foot ({values}) and will lie down,"
-    return _at(MeshVerdict.HELD_BY_MESH, first, reason, first.vertices[foot])
+    return _at(MeshVerdict.HELD_BY_MESH, surfaces[0], reason, surfaces[0].vertices[foot])
 
 
 def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -> Finding:
     """The finding from the trend of the lowest eigenvalue, where all else persists."""
-    index, finest = certificates[0].index, surfaces[-1]
+    index = certificates[0].index
     kind = "stable" if index == 0 else f"a saddle of index {index}"
     reason = f"{kind} on {' and '.join(str(surface.m) for surface in surfaces[1:])} triangles too"
     lowest = [float(c.eigenvalues[0]) for c in certificates if len(c.eigenvalues)]
@@ -199,9 +183,8 @@ def _stability(surfaces: Sequence[Surface], certificates: Sequence[Certificate])
     reason += f", but the lowest eigenvalue falls from mesh to mesh ({values}) with no limit in sight"
     if lowest[-1] + FURTHER * step >= 0.0:
         return Finding(MeshVerdict.PERSISTS, reason)
-    place = _where_softest(finest, certificates[-1])
     reason += f": it would be a saddle within {FURTHER} more refinements, by a motion"
-    return _at(MeshVerdict.HELD_BY_MESH, finest, reason, place)
+    return _at(MeshVerdict.HELD_BY_MESH, surfaces[-1], reason, _where_softest(surfaces[-1], certificates[-1]))
 
 
 def _where_softest(surface: Surface, certificate: Certificate) -> Floats:
@@ -218,10 +201,8 @@ def _other_contact(coarse: Surface, fine: Surface) -> Finding | None:
         tops = walls.top_edges[walls.wall_below == k]
         lengths = segment_lengths(coarse.vertices, tops)
         if abs(after[k] - before[k]) > 2.0 * lengths.max() + RESTED * lengths.sum():
-            reason = (
-                f"on {fine.m} triangles the junction over {coarse.patches[k].name!r} rests on the plane along"
-                f" {after[k]:.3g} of its length {lengths.sum():.3g}, here along {before[k]:.3g}"
-            )
+            reason = f"on {fine.m} triangles the junction over {coarse.patches[k].name!r} rests on the plane"
+            reason += f" along {after[k]:.3g} of its length {lengths.sum():.3g}, here along {before[k]:.3g}"
             return Finding(MeshVerdict.CHANGES, reason, _tuple(coarse.vertices[tops].mean(axis=(0, 1))))
     return None
 
@@ -252,13 +233,11 @@ def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats, more
             wall = next(surface.patches[k].name for k in curve.sheets if sliding[k])
             ending = f"; the junction {names} there ends at {point_text(end, surface.size)}"
             ending += ", where only the mesh holds it"
-            advice = (
-                f'hold the bottom of {wall!r}: bottom = "held" under its divider in a plan, or add its lowest'
-                " vertices to fixed="
-            )
+            advice = f'hold the bottom of {wall!r}: bottom = "held" under its divider in a plan, or add its'
+            advice += " lowest vertices to fixed="
     return Finding(verdict, reason + ending, _tuple(place), advice)
 
 
 def _tuple(place: Floats) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in place)
+    x, y, z = place.tolist()
     return x, y, z

@@ -40,17 +40,12 @@ class Reading:
 
 
 def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[Key, Reading]:
-    """The quantities of a surface. Keys are the same for all refinements of one surface.
-
-    All supports together carry the loads in the limit; on a mesh forces within the sheets, which move no
-    vertex, keep a part that comes and goes from mesh to mesh. So the loads are the estimate of the reaction.
-
-    ``vertices`` is the number of vertices of the coarsest mesh, which come first in all finer ones.
-    """
-    share = ROUNDING + RESIDUALS * certificate.residual
-    size, tension = surface.size, float(surface.tensions.max())
-    areas = certificate.patches["area"].to_numpy()
-    whole = float(areas.sum())
+    """The quantities of a surface. Keys are the same for all refinements of one surface. All supports
+    together carry the loads in the limit; on a mesh forces within the sheets, which move no vertex, keep a
+    part that comes and goes from mesh to mesh. So the loads are the estimate of the reaction. ``vertices`` is
+    the number of vertices of the coarsest mesh, which come first in all finer ones."""
+    share, areas = ROUNDING + RESIDUALS * certificate.residual, certificate.patches["area"].to_numpy()
+    size, tension, whole = surface.size, float(surface.tensions.max()), float(areas.sum())
     found: dict[Key, Reading] = {}
 
     def add(
@@ -111,35 +106,25 @@ def given_volume(surface: Surface) -> float | None:
 
 
 def _boundaries(surface: Surface, certificate: Certificate) -> Iterator[tuple[EdgeCurve, str, Floats, float]]:
-    """Each held boundary curve, its name, its reaction (3,) and the largest one per length.
-
-    Of several curves of one name, each is named with its place; those around one centre with the number of
-    their support, too.
-    """
+    """Each held boundary curve, its name, its reaction (3,) and the largest one per length. Of several curves
+    of one name, each is named with its place; those around one centre with the number of their support,
+    too."""
     curves = held_curves(surface)
     table = certificate.boundaries.iloc[: len(curves)]  # the first of the supports
     numbers = certificate.supports["support"].iloc[: len(curves)]
     names = table["boundary"].astype(str).tolist()
-    middles = table[["middle_x", "middle_y", "middle_z"]].to_numpy()
-    forces = table[["reaction_x", "reaction_y", "reaction_z"]].to_numpy()
-    largest = table["per_length_max"].tolist()
-    places = [
-        name if names.count(name) == 1 else f"{name} near {point_text(at, surface.size)}"
-        for name, at in zip(names, middles, strict=True)
-    ]
-    for curve, place, number, force, most in zip(curves, places, numbers, forces, largest, strict=True):
-        own = place if places.count(place) == 1 else f"{place}, {number}"
-        yield curve, own, force, most
+    middles, forces = (table[[f"{of}_{c}" for c in "xyz"]].to_numpy() for of in ("middle", "reaction"))
+    near = [f"{name} near {point_text(at, surface.size)}" for name, at in zip(names, middles, strict=True)]
+    places = [one if names.count(one) == 1 else other for one, other in zip(names, near, strict=True)]
+    own = [at if places.count(at) == 1 else f"{at}, {k}" for at, k in zip(places, numbers, strict=True)]
+    yield from zip(curves, own, forces, table["per_length_max"].tolist(), strict=True)
 
 
 def _height(surface: Surface, patch: int, rounding: float) -> tuple[float, float, float]:
-    """Height of a patch's ``summit`` over Π, ``rounding``, and the height of the smooth surface
-    through the vertices there.
-
-    The highest vertex is up to half an edge beside the top, at random from mesh to mesh. The paraboloid
-    through it and its neighbours, or on a junction the parabola, has its top at the surface's own. In a
-    mirror plane the images of its neighbours belong to them.
-    """
+    """Height of a patch's ``summit`` over Π, ``rounding``, and the height of the smooth surface through the
+    vertices there. The highest vertex is up to half an edge beside the top, at random from mesh to mesh. The
+    paraboloid through it and its neighbours, or on a junction the parabola, has its top at the surface's own.
+    In a mirror plane the images of its neighbours belong to them."""
     local, topo = surface.plane.to_local(surface.vertices), surface.topology
     top, side = summit(surface, patch)
     value, on_junction = float(local[top, 2]), topo.on_junction[top]
@@ -153,9 +138,9 @@ def _height(surface: Surface, patch: int, rounding: float) -> tuple[float, float
     for plane in mirrors:
         beside = np.concatenate([beside, beside - 2.0 * plane.height(beside)[:, None] * plane.normal])
     step = surface.plane.to_local(beside) - local[top]
-    if on_junction and len(beside) != 2:
-        return value, rounding, value
     if on_junction:
+        if len(beside) != 2:
+            return value, rounding, value
         along = step[0, :2] - step[1, :2]
         along /= np.linalg.norm(along) or 1.0
         step = np.column_stack([step[:, :2] @ along, np.zeros(2), step[:, 2]])

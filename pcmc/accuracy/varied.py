@@ -34,11 +34,10 @@ class Varied:
         """What a text names on a surface. Errors as ``margin``."""
         known = named(surface)
         parts = known[validate.choice("what", what, [*known])]
+        walls = [surface.patches[k].name for k in np.flatnonzero(surface.walls)]
+        more = all(kind not in ("cable", "tension") or name in walls for kind, name in parts)
         if towards is not None:
-            validate.choice("towards", towards, ("more", "less"))
-        walls = {patch.name for patch, wall in zip(surface.patches, surface.walls, strict=True) if wall}
-        pulls = any(kind == "cable" or (kind == "tension" and name not in walls) for kind, name in parts)
-        more = not pulls if towards is None else towards == "more"
+            more = validate.choice("towards", towards, ("more", "less")) == "more"
         values = np.array([Parameter(name, kind).value(surface) for kind, name in parts])
         if what == parts[0][1]:
             what = Parameter(what, parts[0][0]).label
@@ -62,8 +61,8 @@ class Varied:
 
     def at(self, factor: float) -> dict[str, float]:
         """The values at λ, by their labels."""
-        values = np.where(self.unit > 0.0, self.unit * factor, self.values * factor).tolist()
-        return {Parameter(name, kind).label: x for (kind, name), x in zip(self.parts, values, strict=True)}
+        labels = (Parameter(name, kind).label for kind, name in self.parts)
+        return dict(zip(labels, ((self.values + self.unit) * factor).tolist(), strict=True))
 
 
 def named(surface: Surface) -> Mapping[str, tuple[Part, ...]]:
@@ -78,19 +77,19 @@ def named(surface: Surface) -> Mapping[str, tuple[Part, ...]]:
     """
     every = [patch.name for patch in surface.patches]
     sheets = [name for name, wall in zip(every, surface.walls, strict=True) if not wall]
-    cables = dict.fromkeys(cable.name for cable in surface.cables)
-    owners = {"pressure": sheets, "snow": sheets, "weight": every, "tension": every, "cable": [*cables]}
-    owners["cable_weight"] = [*cables]
-    owners["volume"] = [room.name for room in surface.rooms]
+    cables = [*dict.fromkeys(cable.name for cable in surface.cables)]
+    owners = {"pressure": sheets, "snow": sheets, "weight": every, "tension": every, "cable": cables}
+    owners |= {"cable_weight": cables, "volume": [room.name for room in surface.rooms]}
     listed = {kind: tuple((kind, name) for name in names) for kind, names in owners.items() if names}
     tensions = listed["tension"] + listed.get("cable", ())
-    pulling = tuple(part for part in tensions if Parameter(part[1], part[0]).value(surface) > 0.0)
     weights = listed["weight"] + listed.get("cable_weight", ())
-    heavy = tuple(part for part in weights if Parameter(part[1], part[0]).value(surface) != 0.0)
+    of = {part: Parameter(part[1], part[0]).value(surface) for part in (*tensions, *weights)}
     out = in_the_open(surface) | (surface.snows != 0.0)
-    snowed = tuple(part for part in listed.get("snow", ()) if out[surface.patch_index(part[1])])
-    together = listed | ({"tension": pulling} if pulling else {}) | ({"weight": heavy} if heavy else {})
-    together |= {"snow": snowed} if snowed else {}
+    together = {
+        "tension": tuple(part for part in tensions if of[part] > 0.0),
+        "weight": tuple(part for part in weights if of[part] != 0.0),
+        "snow": tuple(part for part in listed.get("snow", ()) if out[surface.patch_index(part[1])]),
+    }
     single = {Parameter(name, kind).label: ((kind, name),) for kind, name in sum(listed.values(), ())}
     plain = {name: ((kind, name),) for kind, name in tensions[::-1]}
-    return {**together, **single, **plain}
+    return {**listed, **{kind: parts for kind, parts in together.items() if parts}, **single, **plain}

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,16 +21,16 @@ from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate
 from ..certificate.proof import Overload
 from ..certificate.verdict import Verdict
+from ..design import Parameter, Target
 from ..plan import Divider, Plan
 from ..plan.edges import usual_cable
+from ..plan.lines import SNAP, is_straight
 from ..plan.parts import BALANCED
+from ..plan.proposal import ABOVE_LEAST, least_tension, plan_area
 from ..surface import Plane, Surface
 from ..surface.curves import Curve
 from ..surface.pieces import two_digits
 from .rises import Rise, net_pressures, outline_heights
-
-if TYPE_CHECKING:
-    from ..design import Parameter, Target
 
 BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of it
 NO_LOADS = ("distance", "tensions")  # a fold on these ways says nothing of the loads
@@ -86,11 +86,11 @@ def check_apexes(plan: Plan | None, surface: Surface, targets: Sequence[Target],
         top = float(heights[corners[surface.pinned[corners]]].max(initial=-math.inf))
         if top <= highest + near:
             continue
-        holder, unit = "a support", units.behind("length")
-        for hole in plan.holes if plan is not None else ():
-            edge = hole.curve.local(surface.plane).at(hole.curve.dense)
-            if holder == "a support" and edge.shape[1] > 2 and abs(float(edge[:, 2].max()) - top) <= near:
-                holder = hole.name
+        rims = (
+            (h.name, h.curve.local(surface.plane).at(h.curve.dense)) for h in (plan.holes if plan else ())
+        )
+        raised = (name for name, at in rims if at.shape[1] > 2 and abs(float(at[:, 2].max()) - top) <= near)
+        holder, unit = next(raised, "a support"), units.behind("length")
         text = f"{holder} is held at {top:.6g}{unit}, so the {target.label} cannot be {highest:.6g}{unit}"
         raise OptionError(text, what="apex", where=target.of, found=highest)
 
@@ -132,8 +132,7 @@ def improved(plan: Plan, certificate: Certificate) -> Plan:
         balanced = with_dividers(plan, {d.name for d in plan.dividers}, wall=BALANCED)
         plan = balanced if changes(plan, balanced) else with_upright(plan) or plan
     for _ in range(len(plan.dividers) + len(plan.patches)):  # walls at which tensions hardly balance
-        surface = plan.surface()
-        strained = strained_junction(surface)
+        strained = strained_junction(plan.surface())
         if strained is None or strained.remedy is None:
             break
         name, tension, _ = strained.remedy
@@ -145,12 +144,9 @@ def improved(plan: Plan, certificate: Certificate) -> Plan:
 
 def _stiffer(plan: Plan, certificate: Certificate) -> Plan:
     """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
-    from ..plan.proposal import ABOVE_LEAST, least_tension, plan_area  # needs shapely
 
-    pressures = [abs(p) for p in net_pressures(plan).values()]
-    least = ABOVE_LEAST * least_tension(plan_area(plan), max(pressures))
-    tried = [a for a in certificate.tried if a.folds and a.way not in NO_LOADS]
-    folds = [1.0 / attempt.value for attempt in tried if attempt.value]
+    least = ABOVE_LEAST * least_tension(plan_area(plan), max(map(abs, net_pressures(plan).values())))
+    folds = [1.0 / a.value for a in certificate.tried if a.folds and a.way not in NO_LOADS and a.value]
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
 
     def higher(tension: float) -> float:
@@ -203,13 +199,11 @@ def _line(rise: Rise, lower: Rise) -> str:
 
 def _scaled(plan: Plan, factor: float) -> Plan:
     areas = [replace(area, tension=two_digits(area.tension * factor)) for area in plan.patches]
-    whole = None if plan.tension is None else two_digits(plan.tension * factor)
-    return replace(plan, patches=areas, tension=whole)
+    return replace(plan, patches=areas, tension=plan.tension and two_digits(plan.tension * factor))
 
 
 def with_upright(plan: Plan) -> Plan | None:
     """The plan with all walls upright that can be, those under straight lines; None if they are already."""
-    from ..plan.lines import SNAP, is_straight  # needs shapely, as the plan's mesh did
 
     near, walls = SNAP * plan.edge_length, [d for d in plan.dividers if d.wall is not None and not d.upright]
     leaning = {d.name for d in walls if is_straight(d.curve.local(plan.plane), near)}
@@ -223,17 +217,16 @@ def with_dividers(plan: Plan, names: set[str], **new: Any) -> Plan:
 
 def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
     """The lines to type that make the one plan the other; some tensions stand ``instead`` of rises."""
-    rows: list[tuple[str, Any, Any, Sequence[str]]]
-    rows, alone = [("[plan]", plan, other, ("edge", "cable", "tension", "pressure"))], set[str]()
+    rows: list[tuple[str, Any, Any, Sequence[str]]] = []
+    rows.append(("[plan]", plan, other, ("edge", "cable", "tension", "pressure")))
     for before, after in zip(plan.patches, other.patches, strict=True):
         rows.append((f"[plan.patches] {toml_key(before.name)}:", before, after, ("tension", "pressure")))
     for number, (hole, new) in enumerate(zip(plan.holes, other.holes, strict=False), 1):
         rows.append((f"[[plan.holes]] number {number}:", hole, new, ("edge", "cable")))
     for number, (divider, line) in enumerate(zip(plan.dividers, other.dividers, strict=True), 1):
         place = f"[[plan.dividers]] number {number} ({divider.name!r}):"
-        if vars(divider) == vars(Divider(divider.curve, name=f"wall {number}")):
-            alone.add(place)
         rows.append((place, divider, line, ("wall", "bottom", "upright")))
+    alone = [vars(Divider(d.curve, name=f"wall {k}")) for k, d in enumerate(plan.dividers, 1)]
     risen = {"[plan]" if r.patch is None else f"[plan.patches] {toml_key(r.patch)}:": r.kind for r in instead}
     walls, lines = other.surface().patches, []
     for place, before, after, keys in rows:
@@ -249,7 +242,7 @@ def changes(plan: Plan, other: Plan, instead: Sequence[Rise] = ()) -> list[str]:
                 if new == old:  # balanced as it is
                     continue
             why = f"instead of {kind}" if kind else f"now {_shown(old)}"
-            if place in alone:
+            if vars(before) in alone:
                 why += f"; a curve alone becomes {{curve = ..., {key} = {_shown(new)}}}"
             change = f"remove {key}" if new is None else f"{key} = {_shown(new)}"
             lines.append(f"{place} {change}  ({why})")
@@ -261,6 +254,5 @@ def _shown(value: Any) -> str:
 
 
 def _is_wall_of(divider: Divider, name: str) -> bool:
-    """Whether a patch is the wall of a divider, or a part of it."""
     stem, dash, number = name.rpartition("-")
     return name == divider.name or (bool(dash) and stem == divider.name and number.isdigit())

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
@@ -20,16 +20,16 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..base.tolerances import ON
-from ..plan import Divider, Hole, Plan, patch_names
+from ..design import Parameter, Target
+from ..plan import Hole, Plan, patch_names
+from ..plan.draft import part_count
 from ..plan.edges import usual_cable
 from ..plan.lines import SNAP, Kind, PlanLine
 from ..plan.parts import BALANCED
+from ..plan.proposal import largest_circle, least_tension, least_tensions, plan_area
 from ..surface import checks
 from ..surface.curves import Curve
 from ..surface.pieces import two_digits
-
-if TYPE_CHECKING:
-    from ..design import Parameter, Target
 
 RISES = ("rise", "apex")  # of a patch
 WHOLE = (*RISES, "span_ratio")  # of all patches together
@@ -77,13 +77,12 @@ def taken(
     values: dict[str, Any], kinds: Sequence[str], patch: str | None, *, keep: bool = False
 ) -> list[Rise]:
     """The rise in a table, which is taken out; the tension 1 stands for it, unless ``keep``."""
-    given = [kind for kind in kinds if kind in values]
-    if not given:
+    given = [kind for kind in (*kinds, "tension") if kind in values]
+    if not given or given == ["tension"]:
         return []
-    if len(given) > 1 or "tension" in values:
+    if len(given) > 1:
         where = "the plan" if patch is None else f"patch {patch!r}"
-        both = " and a ".join([*given, *(["tension"] if "tension" in values else [])])
-        text = f"{where} has a {both}; give one of them, the others follow"
+        text = f"{where} has a {' and a '.join(given)}; give one of them, the others follow"
         raise OptionError(text, what=given[0], where=patch)
     if not keep:
         values["tension"] = 1.0
@@ -92,13 +91,8 @@ def taken(
 
 def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], list[Parameter]]:
     """The plan with a first tension for each rise, the targets, and the tensions that are to be found."""
-    from ..design import Parameter, Target
-
     if not rises:
         return plan, [], []
-    from ..plan.draft import part_count
-    from ..plan.proposal import largest_circle, least_tension, least_tensions, plan_area
-
     part_count(plan)  # refuses lines that do not fit together, which have no area
     area = plan_area(plan)
     least, span = least_tension(area), 2.0 * largest_circle(area)[1]
@@ -108,9 +102,10 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     targets, vary = [], []
     for rise in rises:
         if rise.kind != "apex" and np.ptp(heights) > ON * plan.outline.length:
-            text = f"{rise.kind}: the outline is not level, so a rise over it is not defined; give apex"
-            text += " instead, the greatest height over the plane"
-            raise OptionError(text, what=rise.kind, where=rise.patch)
+            text = (
+                f"{rise.kind}: the outline is not level, so a rise over it is not defined; give apex instead,"
+            )
+            raise OptionError(f"{text} the greatest height over the plane", what=rise.kind, where=rise.patch)
         over = rise.value if rise.kind != "span_ratio" else span / rise.value
         height = rise.value if rise.kind == "apex" else level + over
         if height - lowest <= ON * plan.outline.length:
@@ -146,13 +141,11 @@ def net_pressures(plan: Plan) -> dict[str, float]:
 
 
 def _retensioned(plan: Plan, patch: str | None, least: float, rise: float) -> Plan:
-    """The plan with the first tension for a rise, of a patch or of all."""
     if plan.tension is not None:
         return replace(plan, tension=first_tension(least, net_pressures(plan)[""], rise))
     first = {name: first_tension(least, pressure, rise) for name, pressure in net_pressures(plan).items()}
-    if patch is None:
-        first = dict.fromkeys(first, max(first.values()))
-    patches = [replace(a, tension=first[a.name]) if patch in (None, a.name) else a for a in plan.patches]
+    tension = max(first.values()) if patch is None else first[patch]
+    patches = [replace(a, tension=tension) if patch in (None, a.name) else a for a in plan.patches]
     return replace(plan, patches=patches)
 
 
@@ -220,13 +213,10 @@ def point_masts(plan: Plan) -> list[Mast]:
     given = {k: np.asarray(s, dtype=float) for k, s in enumerate(plan.supports) if not isinstance(s, Curve)}
     if not given:
         return []
-    parts: Sequence[Hole | Divider] = (*plan.holes, *plan.dividers)
     curves = [s for s in plan.supports if isinstance(s, Curve)]
-    curves += [part.curve for part in parts]
-    lines, mirrors = (
-        [PlanLine("line", Kind.SUPPORT, curve.local(plan.plane)) for curve in some]
-        for some in (curves, plan.mirrors)
-    )
+    curves += [part.curve for parts in (plan.holes, plan.dividers) for part in parts]
+    every = [PlanLine("line", Kind.SUPPORT, curve.local(plan.plane)) for curve in (*curves, *plan.mirrors)]
+    lines, mirrors = every[: len(curves)], every[len(curves) :]
     points = np.array([plan.plane.to_local(p) if len(p) == 3 else np.append(p, 0.0) for p in given.values()])
     snap, places = SNAP * plan.edge_length, shapely.points(points[:, :2])
     rim = PlanLine("outline", Kind.OUTLINE, plan.outline.local(plan.plane)).shape
@@ -248,14 +238,13 @@ def point_masts(plan: Plan) -> list[Mast]:
 
 def _dome(plan: Plan) -> float:
     """The height to which pressure lifts the middle of a plan, about: of the flattest cap over its circle."""
-    from ..plan.proposal import least_tension, plan_area
 
     loads, tensions = net_pressures(plan).values(), [area.tension for area in plan.patches]
     if min(loads) <= 0.0:
         return 0.0
     rim = 2.0 * least_tension(plan_area(plan))
-    radii = (2.0 * alpha / p for alpha, p in zip(tensions or [plan.tension or 1.0], loads, strict=True))
-    radius = max(rim, *radii)
+    tensions = tensions or [plan.tension or 1.0]
+    radius = max(rim, *(2.0 * alpha / p for alpha, p in zip(tensions, loads, strict=True)))
     return radius - math.sqrt(radius**2 - rim**2)
 
 
@@ -277,10 +266,10 @@ def ring_lines(masts: Sequence[Mast], share: float, *, drawn: bool) -> list[str]
         if drawn:
             lines.append(f"draw a circle of radius {radius} around ({x}, {y}) at height {z} on layer 'mast'")
             lines.append(f"delete the point or line at ({x}, {y}) there")
-            continue
-        curve = f"{{circle = {{centre = [{x}, {y}, {z}], radius = {radius}}}}}"
-        lines += ["[[plan.holes]]", f'name = "mast {number}"', f"curve = {curve}"]
-        lines.append(f"[plan] supports: remove {mast.text}")
+        else:
+            curve = f"{{circle = {{centre = [{x}, {y}, {z}], radius = {radius}}}}}"
+            lines += ["[[plan.holes]]", f'name = "mast {number}"', f"curve = {curve}"]
+            lines.append(f"[plan] supports: remove {mast.text}")
     return lines
 
 

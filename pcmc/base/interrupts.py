@@ -62,8 +62,7 @@ def stop_requested(error: BaseException) -> None:
     if trace is None or not isinstance(error, StopIteration):
         return
     code = trace.tb_frame.f_code
-    raised = code.co_code[trace.tb_lasti] == dis.opmap["RAISE_VARARGS"] and code.co_name != "__next__"
-    if not raised:
+    if code.co_code[trace.tb_lasti] != dis.opmap["RAISE_VARARGS"] or code.co_name == "__next__":
         what = f"StopIteration out of next(), in {code.co_name}"
         raise RuntimeError(f"{what}, where nothing asked to stop; raise it to stop") from error
 

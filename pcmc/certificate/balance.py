@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools
 from ..base.tolerances import EXCESS, HARDLY, ON, PARALLEL
 from ..forces.cables import cable_pulls
 from ..forces.pinching import standing_part
@@ -61,8 +61,7 @@ def overload(surface: Surface) -> Overload | None:
     """
     if not (surface.net_pressures.any() and load_is_given(surface)):
         return None
-    fixed = np.asarray(surface.pinned[surface.topology.edges].all(axis=1))
-    ratio = _load_over_capacity(surface, fixed)
+    ratio = _load_over_capacity(surface, np.asarray(surface.pinned[surface.topology.edges].all(axis=1)))
     return Overload(ratio, load_name(surface)) if ratio > 1.0 + EXCESS else None
 
 
@@ -94,21 +93,17 @@ def load_is_given(surface: Surface) -> bool:
 
 
 def _load_over_capacity(surface: Surface, carrying: Bools) -> float:
-    """Load over capacity of edges by their mask (e,) along Π's normal, in the worst connected part."""
-    forces, ends = loads(surface) @ np.array(surface.plane.normal), surface.cable_edges.ends
-    parts, first = surface.topology.components, surface.nodes[:, 0]
+    """Load over capacity of edges by their mask (e,) along Π's normal, in the worst connected part.
+
+    Single vertices and the ends of cables carry, too.
+    """
+    topo, X, F, ends = surface.topology, surface.vertices, surface.faces, surface.cable_edges.ends
+    parts, count = topo.components, int(topo.components.max()) + 1
+    forces, first = loads(surface) @ np.array(surface.plane.normal), surface.nodes[:, 0]
     points = (len(forces) - len(ends)) // len(first)  # of the quadrature, on an element
     part = np.concatenate([np.repeat(parts[first], points), parts[ends[:, 0]]])
-    capacity = _capacity(surface, carrying)
-    load = np.abs(np.bincount(part, forces, len(capacity)))
-    return float((load / np.where(capacity > 0.0, capacity, np.inf)).max())
+    load = np.abs(np.bincount(part, forces, count))
 
-
-def _capacity(surface: Surface, carrying: Bools) -> Floats:
-    """(c,) the most that edges by their mask (e,), single vertices and ends of cables carry along Π's normal,
-    by connected part."""
-    topo, X, F = surface.topology, surface.vertices, surface.faces
-    parts, count = topo.components, int(topo.components.max()) + 1
     pull = np.repeat(surface.tensions[surface.patch_of_face][:, None], 3, axis=1)  # at the sides' middles
     if surface.weights.any():
         height, weight = surface.plane.height(X)[F], surface.weights[surface.patch_of_face, None]
@@ -128,10 +123,9 @@ def _capacity(surface: Surface, carrying: Bools) -> Floats:
         opposite = np.linalg.norm(edge_vectors(X[F]), axis=2)
         pulled = pull.mean(axis=1) * (opposite * single[F]).sum(axis=1)
         capacity = capacity + 0.5 * np.bincount(parts[F[:, 0]], pulled, count)
-    ends = surface.cable_edges.ends
     last = supports[ends].sum(axis=1) == 1
-    pulls = np.abs(cable_pulls(surface, X))[last]
-    return np.asarray(capacity + np.bincount(parts[ends[last, 0]], pulls, count), dtype=np.float64)
+    capacity = capacity + np.bincount(parts[ends[last, 0]], np.abs(cable_pulls(surface, X))[last], count)
+    return float((load / np.where(capacity > 0.0, capacity, np.inf)).max())
 
 
 def coarseness(surface: Surface) -> float:
@@ -247,10 +241,8 @@ def growing_part(surface: Surface) -> str:
     if growing is None:
         return ""
     vertex = np.flatnonzero(surface.topology.components == growing)[0]
-    return (
-        f"nothing fixes the part of the surface around vertex {vertex}: from every equilibrium it grows or"
-        " shrinks to nothing, so that none is stable; hold it, or prescribe its volume (rooms=)"
-    )
+    text = f"nothing fixes the part of the surface around vertex {vertex}: from every equilibrium it grows or"
+    return f"{text} shrinks to nothing, so that none is stable; hold it, or prescribe its volume (rooms=)"
 
 
 def _scaled(surface: Surface) -> list[tuple[int, bool]]:
@@ -283,8 +275,10 @@ def pressures_left_over(surface: Surface) -> str:
     at = (surface.topology.edge_of_face == edges[0]).any(axis=1)
     names = " | ".join(surface.patches[k].name for k in np.unique(surface.patch_of_face[at]))
     place = point_text(surface.vertices[surface.topology.edges[edges[0]]].mean(axis=0), surface.size)
+    text = f"along {len(edges)} edges that nothing holds ({names} near {place}) the pressures do not cancel:"
+    text += (
+        f" {abs(surface.uncancelled[edges[0]]):.3g} is left over and acts from there to the point of Π, so"
+    )
     return (
-        f"along {len(edges)} edges that nothing holds ({names} near {place}) the pressures do not"
-        f" cancel: {abs(surface.uncancelled[edges[0]]):.3g} is left over and acts from there to the point of"
-        " Π, so the shape depends on that point; give a wall the pressure of one room less that of the other"
+        f"{text} the shape depends on that point; give a wall the pressure of one room less that of the other"
     )

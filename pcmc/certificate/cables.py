@@ -49,8 +49,8 @@ def chord(surface: Surface, of: str) -> Chord:
 
 
 def _chord_ends(surface: Surface, cable: Ints) -> tuple[Ints, Floats] | None:
-    """(2,) vertices and (2,3) places of the ends of a chord, from the vertices (k,) of a cable with its two
-    ends last; None if it goes on behind mirror planes at both."""
+    """(2,) vertices and (2,3) places of a chord's ends, of a cable (k,) with its ends last; None behind two
+    mirror planes."""
     ends, found = cable[-2:], []
     for end, other in (ends, ends[::-1]):
         for plane, on in surface.on_planes:
@@ -76,12 +76,10 @@ def too_long(surface: Surface) -> str:
         chord = float(np.linalg.norm(ends[1][1] - ends[1][0]))
         tension, widest = float(surface.tensions[curve.sheets[0]]), 2.0 * cable.tension
         if chord * tension > widest:
-            enough = two_digits(chord * tension, math.ceil)  # an arc of 60°, 0.13 of its chord high
-            return (
-                f"cable {cable.name!r} spans {chord:.4g}, more than 2 τ/α = {widest / tension:.4g}, the"
-                f" diameter of the arc along a flat edge; raise its tension, well beyond"
-                f" {0.5 * chord * tension:.3g} (in a plan, cable = {enough:g}), or put a support between"
-            )
+            half, enough = 0.5 * chord * tension, two_digits(chord * tension, math.ceil)  # of an arc of 60°
+            text = f"cable {cable.name!r} spans {chord:.4g}, more than 2 τ/α = {widest / tension:.4g}, the"
+            text += f" diameter of the arc along a flat edge; raise its tension, well beyond {half:.3g}"
+            return f"{text} (in a plan, cable = {enough:g}), or put a support between"
     return ""
 
 

@@ -6,18 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
+from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import PINCHED
-from ..meshing.films import film_of
-from ..meshing.neighbour_swap import can_vanish
+from ..meshing.neighbour_swap import can_vanish, film_of
 from ..meshing.quality import edge_lengths, triangle_quality
 from ..surface import Surface
 from ..surface.geometry import face_areas, segment_lengths
 from ..surface.pieces import point_text
 from ..surface.supports import members
+from ..surface.topology import EdgeCurve, components
 from .forces import held_boundary
 from .tables import names_of
 
@@ -34,7 +34,6 @@ class Neck:
 
     @property
     def ratio(self) -> float:
-        """The girth over that length."""
         return self.girth / self.curve
 
     def __str__(self) -> str:
@@ -52,9 +51,8 @@ def pinched_neck(surface: Surface) -> Neck | None:
 def narrowest_neck(surface: Surface) -> Neck | None:
     """The narrowest neck between two held parts of one connected part; None without two of these.
 
-    A minimal cut: of all sets of edges that part the triangles at one held curve from those at the
-    other, the one of least length. It is computed as a maximal flow from triangle to triangle (Ford
-    and Fulkerson 1956).
+    A minimal cut: of all sets of edges that part the triangles at one held curve from those at the other, the
+    one of least length. It is computed as a maximal flow from triangle to triangle (Ford and Fulkerson 1956).
 
     >>> from pcmc import Patch
     >>> angle = 2 * np.pi * np.arange(6) / 6
@@ -77,16 +75,13 @@ def narrowest_neck(surface: Surface) -> Neck | None:
 def held_groups(surface: Surface) -> tuple[Ints, Floats]:
     """(n,) number of each vertex's held curve, -1 where there is none; and the curves' lengths.
 
-    Curves are the connected parts of held boundary edges; only those on a connected part of the
-    surface that has two or more are numbered. A curve that slides on Π has infinite length: it may
-    shrink.
+    Curves are the connected parts of held boundary edges; only those on a connected part of the surface that
+    has two or more are numbered. A curve that slides on Π has infinite length: it may shrink.
     """
     topo, n = surface.topology, surface.n
     edges = topo.edges[held_boundary(surface)]
-    links = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
-    label = connected_components(links, directed=False)[1]
-    on_curve = np.zeros(n, dtype=bool)
-    on_curve[edges] = True
+    label = components(edges, n)
+    on_curve = np.isin(np.arange(n), edges)
     curves, first = np.unique(label[on_curve], return_index=True)
     part = topo.components[np.flatnonzero(on_curve)[first]]
     several = curves[np.bincount(part)[part] > 1] if len(part) else curves
@@ -121,8 +116,8 @@ def _cut(surface: Surface, groups: Ints, lengths: Floats, number: int) -> Neck |
 def _minimal_cut(edge_of_face: Ints, inner: Ints, lengths: Floats, starts: Ints, ends: Ints) -> Bools:
     """(k,) which of the inner edges (k,) make the shortest cut between two sets of triangles.
 
-    Nodes are the triangles, two for each edge, a source and a sink. An edge passes on at most its
-    length between the triangles at it.
+    Nodes are the triangles, two for each edge, a source and a sink. An edge passes on at most its length
+    between the triangles at it.
     """
     m, k = len(edge_of_face), len(inner)
     number = np.full(int(edge_of_face.max()) + 1, -1)
@@ -161,32 +156,26 @@ SLIPS = 0.25  # of the mode's largest motion: that much beside a fixed end is a 
 def where_collapsed(surface: Surface, pinchable: Bools) -> str:
     """Names the worst triangle outside walls that can pinch, and its cause if that is a known one.
 
-    ``pinchable`` (k,) marks these walls. Two causes are known: a junction slips along a support away
-    from its own end, where only the mesh holds it; or it comes down on the held bottom of its wall,
-    which cannot pinch (``find_walls``).
+    ``pinchable`` (k,) marks these walls. Two causes are known: a junction slips along a support away from its
+    own end, where only the mesh holds it; or it comes down on the held bottom of its wall, which cannot pinch
+    (``find_walls``).
     """
     face, quality = worst_face(surface, pinchable)
     place = surface.vertices[surface.faces[face]].mean(axis=0)
-    worst = (
-        f"worst is face {face} of patch {surface.patches[surface.patch_of_face[face]].name!r} near"
-        f" {point_text(place, surface.size)}, quality {quality:.1e}"
-    )
+    worst = f"worst is face {face} of patch {surface.patches[surface.patch_of_face[face]].name!r} near"
+    worst += f" {point_text(place, surface.size)}, quality {quality:.1e}"
     if films := vanished_films(surface):
         film = film_of(surface, surface.patch_index(films[0]))
         others = f" and {len(films) - 1} more" if len(films) > 1 else ""
         meeting = film.meeting(surface, "then") if film else ""
         return f"{worst}; patch {films[0]!r}{others} may vanish: {meeting}; {SWAP}"
     if held_wall_down(surface, pinchable):
-        return worst + (
-            "; the junction there comes down on the held bottom of its wall, so the wall has no height"
-            " left: make the wall weaker, or let its bottom slide so that the junction can rest on the plane"
-            f" ({KEY.format('sliding')})"
-        )
+        worst += "; the junction there comes down on the held bottom of its wall, so the wall has no height"
+        worst += " left: make the wall weaker, or let its bottom slide so that the junction can rest on the"
+        return f"{worst} plane ({KEY.format('sliding')})"
     if _slips(surface, pinchable, place, REACH * float(np.median(edge_lengths(surface)))):
-        worst += (
-            "; the junction there slips along a support, which does not hold its end: hold the bottom"
-            f" of its wall ({KEY.format('held')})"
-        )
+        worst += "; the junction there slips along a support, which does not hold its end: hold the bottom of"
+        worst += f" its wall ({KEY.format('held')})"
     return worst
 
 
@@ -208,8 +197,7 @@ def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
     Without a bottom vertex below each junction vertex such a wall cannot pinch: its triangles collapse.
     """
     X, patch = surface.vertices, int(surface.patch_of_face[worst_face(surface, pinchable)[0]])
-    used = np.zeros(surface.n, dtype=bool)
-    used[surface.faces[surface.patch_of_face == patch]] = True
+    used = np.isin(np.arange(surface.n), surface.faces[surface.patch_of_face == patch])
     top = used & surface.topology.on_junction
     bottom, top = used & surface.pinned & ~top, top & ~surface.pinned
     if not (surface.auxiliary[patch] and top.any() and bottom.any()):
@@ -245,33 +233,22 @@ def _slips(surface: Surface, pinchable: Bools, place: Floats, reach: float) -> b
     return False
 
 
-@dataclass(frozen=True, eq=False)
-class SlippingEnd:
-    """A fixed end of a junction next to which a mode moves almost as far as anywhere.
+def slipping_ends(surface: Surface, mode: Floats) -> list[tuple[EdgeCurve, int, float]]:
+    """The fixed ends of junctions next to which a mode (n,3) moves almost as far as anywhere: the junction,
+    the end, and the motion at the next vertex over the largest, which orders them.
 
     A mode that the end holds rises from 0 along the junction, to about π h / L after an edge h of the length
     L; one that slips jumps, whatever the mesh, and only the triangles at the end hold it.
     """
-
-    junction: str  # names of the patches that meet there
-    walls: tuple[str, ...]  # names of the walls among them
-    place: Floats  # (3,)
-    share: float  # the mode's motion at the junction's next vertex over its largest motion
-
-
-def slipping_ends(surface: Surface, mode: Floats) -> list[SlippingEnd]:
-    """The fixed ends of junctions that slip in a mode (n,3), the one that slips most first."""
     motion = np.linalg.norm(mode, axis=1)
     largest = float(motion.max(initial=0.0))
-    ends = []
-    for curve in surface.topology.junctions:
-        for end, beside in curve.ends:
-            if not surface.pinned[end] or motion[beside] < SLIPS * largest or largest == 0.0:
-                continue
-            walls = tuple(surface.patches[i].name for i in curve.sheets if surface.walls[i])
-            names, share = names_of(surface, curve.sheets), float(motion[beside] / largest)
-            ends.append(SlippingEnd(names, walls, surface.vertices[end], share))
-    return sorted(ends, key=lambda end: -round(end.share, ALIKE))  # of equal ones the first of the mesh
+    ends = [
+        (curve, end, float(motion[beside] / largest))
+        for curve in surface.topology.junctions
+        for end, beside in curve.ends
+        if surface.pinned[end] and motion[beside] >= SLIPS * largest > 0.0
+    ]
+    return sorted(ends, key=lambda found: -round(found[2], ALIKE))  # of equal ones the first of the mesh
 
 
 def slipping_rings(surface: Surface, mode: Floats) -> list[str]:
@@ -308,12 +285,11 @@ def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
     ends = slipping_ends(surface, mode)
     if not ends:
         return text
-    junctions = " and of ".join(dict.fromkeys(end.junction for end in ends))
-    places = " and ".join(point_text(end.place, surface.size) for end in ends[:4])
-    walls = " and of ".join(dict.fromkeys(repr(name) for end in ends for name in end.walls))
+    junctions = " and of ".join(dict.fromkeys(names_of(surface, curve.sheets) for curve, _, _ in ends))
+    places = " and ".join(point_text(surface.vertices[end], surface.size) for _, end, _ in ends[:4])
+    below = dict.fromkeys(i for curve, _, _ in ends for i in curve.sheets if surface.walls[i])
+    walls = " and of ".join(repr(surface.patches[i].name) for i in below)
     advice = f"hold the bottom of {walls} ({KEY.format('held')})" if walls else "put a wall below it"
     which, verb = ("end", "slips") if len(ends) == 1 else ("ends", "slip")
-    return (
-        f"{text}; the {which} of {junctions} at {places} {verb}: one edge away the junction moves"
-        f" {ends[0].share:.2f} as far, so only the mesh holds it there; {advice}"
-    )
+    text += f"; the {which} of {junctions} at {places} {verb}: one edge away the junction moves"
+    return f"{text} {ends[0][2]:.2f} as far, so only the mesh holds it there; {advice}"

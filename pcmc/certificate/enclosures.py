@@ -26,7 +26,7 @@ from ..forces.pattern import Pattern, pair_place, row_place
 from ..surface import Surface
 from ..surface.geometry import vector
 from . import balls
-from .balls import Ball, Balls, U, exact, gather, minus, plus, times
+from .balls import Ball, Balls, exact, gather, minus, plus, times
 
 
 class MeshArrays(NamedTuple):
@@ -80,16 +80,6 @@ def mesh_arrays(surface: Surface, classes: VertexClasses, pattern: Pattern) -> M
     return MeshArrays(np.array(X), faces, places, patches, *laws, *at, cables, pull, corner, push)
 
 
-def forces(items: MeshArrays, pressures: Floats) -> tuple[Floats, Floats]:
-    """∇E (n,3) and the radii of its balls; ``pressures`` (e,) act on the ends of flat pieces."""
-    value, radius = np.zeros_like(items.X), np.zeros_like(items.X)
-    _add_forces(items, value, radius)
-    each = -pressures[:, None] * items.push
-    np.add.at(value, items.corner, each)
-    np.add.at(radius, items.corner, 2.0 * U * (np.abs(each) + np.abs(value[items.corner])))
-    return value, radius
-
-
 @inlined
 def _triangle(items: MeshArrays, f: int) -> tuple[Balls, Balls, Balls]:
     F, X = items.faces, items.X
@@ -112,7 +102,9 @@ def _bent(items: MeshArrays, f: int, a: Balls, b: Balls, c: Balls) -> tuple[Ball
 
 
 @compiled
-def _add_forces(items: MeshArrays, value: Floats, radius: Floats) -> None:
+def forces(items: MeshArrays, pressures: Floats) -> tuple[Floats, Floats]:
+    """∇E (n,3) and the radii of its balls; ``pressures`` (e,) act on the ends of flat pieces."""
+    value, radius = np.zeros_like(items.X), np.zeros_like(items.X)
     F, n, half = items.faces, balls.of(vector(items.normal)), exact(0.5)
     origin = balls.of(vector(items.origin))
     sixth = balls.reciprocal(exact(6.0))
@@ -140,6 +132,11 @@ def _add_forces(items: MeshArrays, value: Floats, radius: Floats) -> None:
         for d in range(3):
             gather(value[j], radius[j], d, force[d])
             gather(value[i], radius[i], d, (-force[d][0], force[d][1]))
+    for e in range(len(items.corner)):
+        push = balls.times3(exact(-pressures[e]), balls.row(items.push, e))
+        for d in range(3):
+            gather(value[items.corner[e]], radius[items.corner[e]], d, push[d])
+    return value, radius
 
 
 @compiled
@@ -196,8 +193,7 @@ def second_variation(items: MeshArrays, space: MotionSpace, pattern: Pattern) ->
                         entry = plus(entry, times(times(across, lean), balls.dot3(c, nu)))
                     if heavy[0] != 0.0:
                         entry = plus(entry, times(heavy, _slope(b, c, nu, edge[i], edge[j], n)))
-                    at = pair_place(space, pattern, v, r, w, s, items.offset[f, i])
-                    gather(value, radius, at, entry)
+                    gather(value, radius, pair_place(space, pattern, v, r, w, s, items.offset[f, i]), entry)
     _add_cables(items, space, pattern, value, radius)
     return value, radius
 
@@ -233,23 +229,21 @@ def _add_cables(
                     gather(value, radius, at + s, (sign * entry[0], entry[1]))
 
 
+@compiled
 def signed_volumes(items: MeshArrays, signs: Floats, patch_of_end: Ints) -> tuple[Floats, Floats]:
     """(r,) Σ s_i V_i for each row of signs (r,k), flat pieces included, and its radius."""
     value, radius = np.zeros(len(signs)), np.zeros(len(signs))
-    for r, row in enumerate(signs):
-        _add_volume(items, row[items.patch], row[patch_of_end], value[r : r + 1], radius[r : r + 1])
-    return value, radius
-
-
-@compiled
-def _add_volume(items: MeshArrays, sign: Floats, end_sign: Floats, value: Floats, radius: Floats) -> None:
     origin, sixth = balls.of(vector(items.origin)), balls.reciprocal(exact(6.0))
     for f in range(len(items.faces)):
-        if sign[f] != 0.0:
-            x = _triangle(items, f)
-            y = (balls.minus3(x[0], origin), balls.minus3(x[1], origin), balls.minus3(x[2], origin))
-            cone = times(sixth, balls.dot3(y[0], balls.cross3(y[1], y[2])))
-            gather(value, radius, 0, times(exact(sign[f]), cone))
+        x = _triangle(items, f)
+        y = (balls.minus3(x[0], origin), balls.minus3(x[1], origin), balls.minus3(x[2], origin))
+        cone = times(sixth, balls.dot3(y[0], balls.cross3(y[1], y[2])))
+        for r in range(len(signs)):
+            if signs[r, items.patch[f]] != 0.0:
+                gather(value, radius, r, times(exact(signs[r, items.patch[f]]), cone))
     for e in range(len(items.corner)):
         v = balls.minus3(balls.row(items.X, items.corner[e]), origin)
-        gather(value, radius, 0, times(exact(end_sign[e]), balls.dot3(v, balls.row(items.push, e))))
+        for r in range(len(signs)):
+            end = exact(signs[r, patch_of_end[e]])
+            gather(value, radius, r, times(end, balls.dot3(v, balls.row(items.push, e))))
+    return value, radius

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from ..forces import cables
 from ..forces.cables import directions, pull_along
 from ..forces.elements import Points, add_values, energy_mesh
 from ..forces.pinching import standing_part
-from ..forces.triangles import add_weights, totals_and_gradient
+from ..forces.triangles import totals_and_gradient
 from ..surface import Surface
 from ..surface.checks import lying
 from ..surface.geometry import segment_lengths
@@ -43,10 +43,8 @@ def loads(surface: Surface) -> Floats:
     patch = np.repeat(mesh.patch, len(vector) // len(mesh.patch))
     found = surface.net_pressures[patch, None] * vector
     ends, _, weight = surface.cable_edges
-    heavy = np.append(
-        surface.weights[patch] * np.linalg.norm(vector, axis=1),
-        weight * segment_lengths(surface.vertices, ends),
-    )
+    areas, lengths = np.linalg.norm(vector, axis=1), segment_lengths(surface.vertices, ends)
+    heavy = np.append(surface.weights[patch] * areas, weight * lengths)
     found = np.concatenate([found, np.zeros((len(ends), 3))])
     return found - heavy[:, None] * np.array(surface.plane.normal) if surface.heavy else found
 
@@ -83,13 +81,12 @@ def support_forces(surface: Surface) -> Floats:
     cone to the point of Π, whose side is under no pressure.
     """
     X, mesh = surface.vertices, energy_mesh(surface)
-    tension = totals_and_gradient(mesh._replace(pressure=read_only(np.zeros(len(surface.patches)))), X)[2]
-    cable, weight, pressure = np.zeros((3, *X.shape))
-    add_values(cables.elements(surface, X), cable)
-    add_weights(surface, X, weight)
+    pull = totals_and_gradient(mesh._replace(pressure=read_only(np.zeros(len(surface.patches)))), X)[1]
+    add_values(cables.elements(surface, X), pull)
+    pressure = np.zeros(X.shape)
     pushed = mesh.pressure[mesh.patch, None, None] * Points.of(mesh, X).area
     np.add.at(pressure, mesh.faces, np.einsum("qk,eqd->ekd", mesh.shapes.value, pushed))
-    total = surface.folded(-tension - cable - weight + pressure)
+    total = surface.folded(pressure - pull)
     return apply_supports(surface, total.copy()) - total
 
 
@@ -187,13 +184,16 @@ class Forces:
     @property
     def per_length(self) -> Floats:
         """(n,3) the mean of ``pulls`` along the lines at a vertex, force/length; NaN where there is none."""
-        edges, force = self.surface.topology.edges, np.zeros_like(self.reactions)
-        sides = self.surface.topology.sides
-        half = 0.5 * segment_lengths(self.surface.vertices, sides)[:, None] * self.pulls
-        for side in (0, 1):
-            np.add.at(force, edges[:, side], half * self.lines[:, [side]])
-        share = self.lengths[:, None]
+        force, share = self.half_pulls(slice(None), self.pulls, self.lines), self.lengths[:, None]
         return np.divide(force, share, out=np.full(force.shape, np.nan), where=share > 0.0)
+
+    def half_pulls(self, edges: Any, pulls: Floats, ends: Bools | None = None) -> Floats:
+        """(n,3) half the pulls (k,3) along some edges at each end of these, or at the ``ends`` (k,2)."""
+        topo, force = self.surface.topology, np.zeros_like(self.reactions)
+        half = 0.5 * segment_lengths(self.surface.vertices, topo.sides[edges])[:, None] * pulls
+        for side in (0, 1):
+            np.add.at(force, topo.edges[edges, side], half if ends is None else half * ends[:, [side]])
+        return force
 
     def along_patch(self, patch: int | None) -> Bools:
         """(e,) the edges of lines that belong to a patch, or all of them."""
@@ -295,9 +295,8 @@ def cable_ends(
 
 
 def _divided(surface: Surface, forces: Floats, ends: Floats) -> tuple[Bools, Bools, Floats, Floats]:
-    """The vertices (n,) that lines and points hold, those on Π and each of the other planes (1 + planes,n),
-    and what these, (1 + planes,n,3), carry of the reactions (n,3), and of those at the ends of cables.
-    """
+    """The vertices (n,) that lines and points hold; those on Π and the other planes (1 + planes,n); and what
+    each plane carries of the forces and of those at the ``ends`` of cables (1 + planes,n,3)."""
     X, mirror = surface.vertices, np.array([[False], *([plane.mirror] for plane, _ in surface.on_planes)])
     ground = surface.on_plane | (surface.fixed & lying(surface.plane.height(X), X))
     on = np.array([ground, *(mask for _, mask in surface.on_planes)])

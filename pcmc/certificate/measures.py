@@ -115,7 +115,7 @@ def _height(surface: Surface, point: tuple[float, float]) -> Measurement:
 def _area(surface: Surface, of: str | None) -> Measurement:
     """A_i, length²."""
     one = _chosen_patches(surface, of)
-    areas, _, slope = weighted(surface, one)
+    (areas, _, _), slope = weighted(surface, one)
     return Measurement(float(areas[one != 0.0].sum()), slope)
 
 
@@ -207,10 +207,8 @@ def _lean(surface: Surface, of: str | None) -> Measurement:
     so ∂s/∂a = (b - c) × (n - s ν) / |N|. The largest of all θ and -θ: where walls are upright it has a kink.
     """
     walls = [surface.patch_index(of)] if of is not None else np.flatnonzero(surface.walls).tolist()
-    for wall in walls:
-        if not surface.walls[wall]:
-            text = f"lean of {of}: that patch is under pressure; a wall can lean"
-            raise OptionError(text, what="of", found=of)
+    if of is not None and not surface.walls[walls[0]]:
+        raise OptionError(f"lean of {of}: that patch is under pressure; a wall can lean", what="of", found=of)
     if not walls:
         raise OptionError("lean: the surface has no walls", what="of", found=of)
     sines = np.where(np.isin(surface.patch_of_face, walls), lean_sines(surface), 0.0)

@@ -26,10 +26,8 @@ class Overload:
 
     def __str__(self) -> str:
         digits = ".3f" if self.ratio < 1.1 else ".2f" if self.ratio < 1e4 else ".3g"
-        return (
-            f"the {self.load} is {self.ratio:{digits}} times what the boundary's tension could carry on any"
-            " smooth surface"
-        )
+        times = f"{self.ratio:{digits}} times"
+        return f"the {self.load} is {times} what the boundary's tension could carry on any smooth surface"
 
 
 @dataclass(frozen=True)
@@ -85,10 +83,9 @@ class WeakCable:
     angle: float  # φ, the most that its arc can turn by, radians
 
     def __str__(self) -> str:
-        return (
-            f"cable {self.cable!r} is too weak for a flat sail: {self.tension:.4g} < α L / (2 sin(φ/2)) ="
-            f" {self.least:.4g}, L = {self.chord:.4g}, φ = {math.degrees(self.angle):.3g}°; raise it"
-        )
+        text = f"cable {self.cable!r} is too weak for a flat sail: {self.tension:.4g} < α L / (2 sin(φ/2)) ="
+        angle = math.degrees(self.angle)
+        return f"{text} {self.least:.4g}, L = {self.chord:.4g}, φ = {angle:.3g}°; raise it"
 
 
 @dataclass(frozen=True)
@@ -107,8 +104,8 @@ class Unheld:
 
     def __str__(self) -> str:
         falls, shrinks = "and it has a weight: it falls", "which has no pressure: it shrinks to nothing"
-        why = falls if self.falls else shrinks
-        return f"nothing holds the part of the surface around vertex {self.vertex}, {why}"
+        part = f"the part of the surface around vertex {self.vertex}"
+        return f"nothing holds {part}, {falls if self.falls else shrinks}"
 
 
 Proof = Overload | UnbalancedJunction | Unheld | WeakCable

@@ -241,8 +241,7 @@ class Parameter:
 
 def as_parameters(given: Parameter | str | Iterable[Parameter | str]) -> list[Parameter]:
     """One parameter or several as a list; a name, or a list of names, stands for the tension of these."""
-    kinds = (Parameter, str, list, tuple)
-    several = as_list(given, kinds, "a Parameter or the name of a patch")
+    several = as_list(given, (Parameter, str, list, tuple), "a Parameter or the name of a patch")
     parameters = [p if isinstance(p, Parameter) else Parameter(p) for p in several]
     labels = [Parameter(name, p.kind).label for p in parameters for name in p.names]
     for k, label in enumerate(labels):

@@ -38,14 +38,6 @@ class _Part(NamedTuple):
     label: str = ""
 
 
-class _Source(NamedTuple):
-    """Parts that share forces (n,3); the vertices of a mask (n,) that are in none of them are one more."""
-
-    forces: Floats
-    parts: Sequence[_Part]
-    rest: tuple[Bools, str, str] | None = None  # the mask; name and kind
-
-
 def support_table(acting: Forces) -> pd.DataFrame:
     """A row per support of the part of a surface that stands; together they carry all its reactions.
 
@@ -108,7 +100,7 @@ def boundary_shares(acting: Forces, name: str) -> tuple[Floats, Ints]:
     With the share s the table's force is Σ s f + Σ ½ L (δ - s) q over the vertices, and over the ends of the
     edges of length L under the pulls q; δ is 1 on its own edges. Without that name it is the whole boundary.
     """
-    parts, taken = next(_sources(acting)).parts, np.zeros((2, acting.surface.n))
+    parts, taken = next(_sources(acting))[1], np.zeros((2, acting.surface.n))
     chosen = [part for part in parts if part.name == name] or parts
     for row, some in enumerate((chosen, parts)):
         for part in some:
@@ -199,7 +191,7 @@ def _labelled(acting: Forces) -> Iterator[_Part]:
                 sharing[left] = _weights(acting, parts[-1])
         # no pulls where others, such as ends of members, take all
         pulls_at = np.asarray(forces.any(axis=1, keepdims=True))
-        own = [_half_pulls(acting, part) * pulls_at[part.vertices] for part in parts]
+        own = [(acting.half_pulls(*_pulled(acting, part)) * pulls_at)[part.vertices] for part in parts]
         every = np.zeros_like(forces)
         for part, pulled in zip(parts, own, strict=True):
             every[part.vertices] += pulled
@@ -211,15 +203,16 @@ def _labelled(acting: Forces) -> Iterator[_Part]:
             yield part._replace(forces=share, label=f"{letter}{count[letter]}")
 
 
-def _sources(acting: Forces) -> Iterator[_Source]:
-    """All supports, by the forces that they share."""
+def _sources(acting: Forces) -> Iterator[tuple[Floats, list[_Part], tuple[Bools, str, str] | None]]:
+    """All supports, by the forces (n,3) that they share; the vertices of a mask (n,) that are in none of them
+    are one more, of a name and kind."""
     surface, topo = acting.surface, acting.surface.topology
     support, patch = _support_of_edge(surface), _patch_of_edge(surface)
     upright = [abs(float(np.dot(p.normal, surface.plane.normal))) <= PARALLEL for p, _ in surface.on_planes]
     of_plane = ["upright plane" if steep else "plane" for steep in upright]
     kinds = [*of_plane, "plane", "line", "ground"]  # -2 and -1 count from the end
     boundary = [_line(surface, "", curve) for curve in held_curves(surface)]
-    yield _Source(acting.along, [part._replace(kind=kinds[support[part.edges[0]]]) for part in boundary])
+    yield acting.along, [part._replace(kind=kinds[support[part.edges[0]]]) for part in boundary], None
 
     for k, (plane, mask) in enumerate(surface.on_planes, start=1):
         if plane.mirror:
@@ -229,11 +222,11 @@ def _sources(acting: Forces) -> Iterator[_Source]:
             for curve in curves:
                 across = np.outer(sheet_pulls(acting.standing, curve.pairs) @ normal, normal)
                 parts.append(_line(surface, "mirror", curve, f" in the {plane}", across))
-            yield _Source(acting.by_plane[k], parts, (mask, f"single points in the {plane}", "mirror"))
+            yield acting.by_plane[k], parts, (mask, f"single points in the {plane}", "mirror")
 
     chosen = acting.lines.all(axis=1) & ~topo.boundary_edge & at_both_ends(acting.clamped, topo.edges)
     along = np.where(acting.on_boundary[:, None], 0.0, acting.along)
-    yield _Source(along, [_line(surface, "line", c, ", inside") for c in topo.curves_among(chosen)])
+    yield along, [_line(surface, "line", c, ", inside") for c in topo.curves_among(chosen)], None
 
     inside, standing = ~acting.clamped & ~acting.on_boundary, acting.standing
     at_rest = standing.on_ground | (acting.by_plane[0].any(axis=1) & ~acting.clamped)
@@ -245,16 +238,16 @@ def _sources(acting: Forces) -> Iterator[_Source]:
             ends = np.where(acting.lengths[:, None] > 0.0, acting.by_plane_ends[k], 0.0)  # of cables: below
             pull = np.where(inside[:, None], acting.by_plane[k] - ends, 0.0)
             parts = _on_plane(acting, mask, inside, kind, where)
-            yield _Source(pull, parts, (mask & inside, f"single points{where}", kind))
+            yield pull, parts, (mask & inside, f"single points{where}", kind)
 
     X, names = surface.vertices, dict[int, list[str]]()
     single = np.flatnonzero(acting.single)[:, None]
-    yield _Source(acting.points, [_Part("", "point", v, X[v[0]]) for v in single])
+    yield acting.points, [_Part("", "point", v, X[v[0]]) for v in single], None
     for cable, vertex, _ in acting.cable_ends:
         if acting.lengths[vertex] > 0.0 and acting.points[vertex].any():
             names.setdefault(vertex, []).append(cable.name)
     cables = [_Part(" + ".join(names[v]), "cable end", np.array([v]), X[v]) for v in sorted(names)]
-    yield _Source(acting.points, cables)
+    yield acting.points, cables, None
 
 
 def _on_plane(acting: Forces, mask: Bools, inside: Bools, kind: str, where: str) -> list[_Part]:
@@ -302,16 +295,6 @@ def _pulled(acting: Forces, part: _Part) -> tuple[Ints, Floats]:
 def _weights(acting: Forces, part: _Part) -> Floats:
     """(k,) how much of the rest of a force a support takes: a plane next to none where a line is clamped."""
     return np.where(acting.clamped[part.vertices] & (part.kind != "line"), SLIGHT, 1.0)
-
-
-def _half_pulls(acting: Forces, part: _Part) -> Floats:
-    """(k,3) the force on each vertex of a support of half the pulls along its edges there."""
-    edges, pulls = _pulled(acting, part)
-    topo, force = acting.surface.topology, np.zeros_like(acting.reactions)
-    half = 0.5 * segment_lengths(acting.surface.vertices, topo.sides[edges])[:, None] * pulls
-    for side in (0, 1):
-        np.add.at(force, topo.edges[edges, side], half)
-    return force[part.vertices]
 
 
 def _patch_of_edge(surface: Surface) -> Ints:

@@ -111,8 +111,7 @@ def system(part: StandingPart, space: MotionSpace, rigid: Floats) -> System:
         radii = _bordered(pattern, radii, np.stack(column_errors, axis=1))[1]
         pattern, values = _bordered(pattern, values, np.stack(columns, axis=1))
     residual = float(np.linalg.norm(np.abs(left) + error) * SAFE)
-    error_norm = _norm(pattern, radii)
-    enclosed = force, force_radius, values, error_norm, left, error, residual
+    enclosed = force, force_radius, values, _norm(pattern, radii), left, error, residual
     return System(items, space, pattern, *enclosed, len(columns), scales, coupling)
 
 
@@ -129,8 +128,4 @@ def _bordered(pattern: Pattern, values: Floats, columns: Floats) -> tuple[Patter
 
 def _norm(pattern: Pattern, positive: Floats) -> float:
     """A bound of the 2-norm of the symmetric matrix with these entries ≥ 0: its largest row sum."""
-    rows = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr))
-    off = rows != pattern.indices
-    sums = np.bincount(rows, positive, pattern.size)
-    sums += np.bincount(pattern.indices[off], positive[off], pattern.size)
-    return float(sums.max(initial=0.0) * SAFE)
+    return float(pattern.symmetric(positive).sum(axis=1).max(initial=0.0) * SAFE)

@@ -33,8 +33,7 @@ def names_of(surface: Surface, patches: Iterable[int]) -> str:
 
 
 def head_text(certificate: Any, units: Units, rows: dict[str, str]) -> str:
-    """Lines of a name and a text each: whether what is printed comes from a certified surface, or from a part
-    of one; the units; and these rows."""
+    """Lines of a name and a text each: that the surface is not certified or a part; the units; these rows."""
     first = {} if certificate.certified else {"not certified": certificate.verdict.value}
     first |= {"extent": certificate.part, "units": units.sentence if units else ""}
     return "\n".join(f"{name:>14}  {text}" for name, text in (first | rows).items() if text)
@@ -46,24 +45,19 @@ def curve_lengths(surface: Surface, curve: EdgeCurve) -> Floats:
     return segment_lengths(surface.vertices, topo.sides[topo.edge_numbers(curve.pairs)])
 
 
-def curve_points(surface: Surface, curve: EdgeCurve) -> Floats:
-    """(k+1,3) the ends of the edges of a curve, in order; of a periodic surface going on out of its cell."""
-    X, topo, pairs = surface.vertices, surface.topology, curve.pairs
-    if not surface.periodic:
-        return X[np.append(pairs[:, 0], pairs[-1:, 1])]
-    number = topo.edge_numbers(pairs)
-    steps = X[topo.sides[number, 1]] - X[topo.sides[number, 0]]
-    steps[topo.edges[number, 0] != pairs[:, 0]] *= -1.0
-    return np.asarray(X[pairs[0, 0]] + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
-
-
 def middle(surface: Surface, curve: EdgeCurve) -> dict[str, float]:
     """The point half way along a curve, or the centre of a closed one; tells curves of one name apart."""
-    points, lengths = curve_points(surface, curve), curve_lengths(surface, curve)
+    X, topo, pairs, lengths = surface.vertices, surface.topology, curve.pairs, curve_lengths(surface, curve)
+    points = X[np.append(pairs[:, 0], pairs[-1:, 1])]
+    if surface.periodic:  # the curve goes on out of the cell
+        number = topo.edge_numbers(pairs)
+        steps = X[topo.sides[number, 1]] - X[topo.sides[number, 0]]
+        steps[topo.edges[number, 0] != pairs[:, 0]] *= -1.0
+        points[1:] = points[0] + np.cumsum(steps, axis=0)
     if curve.closed:
         place = lengths @ (points[:-1] + points[1:]) / (2.0 * lengths.sum() or 1.0)
     else:
-        along = np.concatenate([[0.0], np.cumsum(lengths)])
+        along = np.append(0.0, lengths.cumsum())
         place = np.array([np.interp(0.5 * along[-1], along, column) for column in points.T])
     place = np.where(np.abs(place) <= ROUNDING * surface.size, 0.0, place)
     return {f"middle_{axis}": float(value) for axis, value in zip("xyz", place, strict=True)}
@@ -77,9 +71,7 @@ def patch_table(surface: Surface, standing: Surface) -> pd.DataFrame:
     rows = []
     for index, patch in enumerate(surface.patches):
         faces = standing.patch_of_face == index
-        inside = np.zeros(surface.n, dtype=bool)
-        inside[standing.faces[faces]] = True
-        inside &= np.isfinite(curvature)
+        inside = np.isin(np.arange(surface.n), standing.faces[faces]) & np.isfinite(curvature)
         varies = patch.weight and inside.any()
         mean = float(curvature[inside].mean()) if inside.any() else np.nan
         row: dict[str, Any] = {
@@ -174,15 +166,9 @@ def room_table(surface: Surface) -> pd.DataFrame:
     if not surface.rooms:
         return pd.DataFrame()
     wanted, reached = prescribed_volumes(surface), room_volumes(surface)
-    return pd.DataFrame(
-        {
-            "room": [room.name for room in surface.rooms],
-            "volume": reached,
-            "prescribed": wanted,
-            "difference": (reached - wanted) / np.abs(wanted),
-            "pressure": room_pressures(surface),
-        }
-    )
+    names, pressure = [room.name for room in surface.rooms], room_pressures(surface)
+    columns = {"room": names, "volume": reached, "prescribed": wanted}
+    return pd.DataFrame(columns | {"difference": (reached - wanted) / np.abs(wanted), "pressure": pressure})
 
 
 def lean_sines(surface: Surface) -> Floats:
@@ -208,8 +194,7 @@ def lean_table(surface: Surface) -> pd.DataFrame:
     >>> lean_table(hall.surface())[["wall", "lean"]].round(6).to_numpy().tolist()
     [['wall 1', 0.0]]
     """
-    rows = []
-    sines = lean_sines(surface)
+    rows, sines = [], lean_sines(surface)
     for wall in np.flatnonzero(surface.walls):
         faces = np.flatnonzero(surface.patch_of_face == wall)
         if len(faces):  # else it is pinched all along
@@ -229,10 +214,7 @@ def cut_note(surface: Surface) -> str:
 
 
 def lean_texts(table: pd.DataFrame, size: float, least: float = 0.05) -> list[str]:
-    """The walls that lean by at least ``least`` degrees, in words, the one that leans most first; ``size`` is
-    that of the surface."""
-    if not len(table):
-        return []
+    """The walls that lean by ``least`` degrees or more, in words, the most first; ``size`` of the surface."""
     leaning = table[table["lean"] >= least].sort_values("lean", ascending=False)
     rows = leaning[["wall", "lean", *"xyz"]].itertuples(index=False, name=None)
     return [f"{wall!r} by {lean:.1f}° near {point_text(np.array(at), size)}" for wall, lean, *at in rows]

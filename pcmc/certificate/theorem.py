@@ -148,18 +148,18 @@ def _proved(surface: Surface) -> Theorem:
     step = (float(np.sqrt((newton * newton).sum())) + beta * found.left_after(newton)) * SAFE
     first = 2.0 * step
     if not first <= MOST * height:
-        raise _Unproved(
+        text = (
             f"the forces left, {found.residual:.1e}, may move it by {first:.1e}: too far beside its thinnest"
-            f" triangle, of height {height:.1e}; solve to a smaller tolerance, or improve the mesh"
         )
+        text += f" triangle, of height {height:.1e}; solve to a smaller tolerance, or improve the mesh"
+        raise _Unproved(text)
     reach = max(REACH * height, first)
     rate = found.lipschitz(reach)
     h = beta * rate * step * SAFE
     if not h <= 0.5:
-        raise _Unproved(
-            f"β L η = {h:.2g} is above ½ (β {beta:.2g}, L {rate:.2g}, η {step:.1e}): it is too near to"
-            " neutral for its thinnest triangles; solve to a smaller tolerance, or improve these"
-        )
+        text = f"β L η = {h:.2g} is above ½ (β {beta:.2g}, L {rate:.2g}, η {step:.1e}): it is too near to"
+        text += " neutral for its thinnest triangles; solve to a smaller tolerance, or improve these"
+        raise _Unproved(text)
     root = np.sqrt(1.0 - 2.0 * h) / SAFE
     # a bound of ‖B₀‖₂, which rounding keeps from 1: the root of the largest row sum of |B₀ᵀB₀|
     sums = np.abs(space.basis @ space.basis.transpose(0, 2, 1)).sum(axis=2)

@@ -21,9 +21,8 @@ from .cables import too_long, weak_cable
 from .diagnosis import Neck, describe_saddle, held_wall_down, pinched_neck, where_collapsed
 from .proof import Attempt, Overload, Proof
 
+SLACK = "no patch has a tension: every shape is at rest"
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
-NO_TENSION = "no patch has a tension: every shape is at rest"
-FREE = "nothing resists {} rigid motions; every change of shape {} raises E"
 
 
 class Verdict(Enum):
@@ -95,10 +94,14 @@ class Findings:
         return theorems(self.surface, self.pinchable, load)
 
     @property
+    def folds(self) -> list[Attempt]:
+        return [attempt for attempt in self.tried if attempt.folds]
+
+    @property
     def lost(self) -> bool:
         """Whether a solver saw the surface run away, or a branch of equilibria fold."""
         away = self.evidence in (Evidence.INFLATED, Evidence.VANISHED) or self.neck is not None
-        return self.moving and (away or any(attempt.folds for attempt in self.tried))
+        return self.moving and bool(away or self.folds)
 
     @cached_property
     def hardly_balanced(self) -> str:
@@ -146,10 +149,6 @@ def judge(f: Findings) -> tuple[Verdict, str]:
     return verdict, "; ".join(str(part) for part in (*told, f.left_over) if part)
 
 
-def _disproved(f: Findings) -> list[object]:
-    return [*f.proofs, *(attempt for attempt in f.tried if attempt.folds), f.neck]
-
-
 def _none_found(f: Findings) -> list[object]:
     return [growing_part(f.surface), *f.tried, f.neck, _compressed(f)]
 
@@ -158,10 +157,8 @@ def _ran_away(f: Findings) -> str:
     if f.neck is not None:
         return f"{f.neck}; bring the held curves nearer to each other, or raise the pressure"
     if f.evidence is Evidence.INFLATED:
-        return (
-            "it grew without bound; start lower, raise the tensions or lower the pressures, or follow the"
-            " pressure from a lower one (pcmc.follow)"
-        )
+        what = "start lower, raise the tensions or lower the pressures"
+        return f"it grew without bound; {what}, or follow the pressure from a lower one (pcmc.follow)"
     return "it shrank to nothing; hold it with fixed= or on_plane=, raise the pressure, or start larger"
 
 
@@ -174,33 +171,24 @@ def _residual(f: Findings) -> str:
 
 
 def _forces_left(f: Findings) -> list[object]:
-    coarse = f"{f.overload}: only a mesh as coarse as this may come to rest, a finer one cannot"
-    reasons = [_residual(f), _single_precision(f), f.hardly_balanced, too_long(f.surface), _compressed(f)]
-    return [*reasons, coarse if f.overload else "", *f.tried[1:]]
-
-
-def _single_precision(f: Findings) -> str:
-    """That the coordinates have but the digits of .glb files, where that alone may leave the forces."""
     X, coarser = f.surface.vertices[f.surface.free], np.finfo(np.float32).eps / np.finfo(float).eps
-    if f.residual > NOISE * coarser * f.rounding or not np.array_equal(X, X.astype(np.float32)):
-        return ""
-    return "its coordinates are in single precision, as in a .glb file, which alone leaves as much"
+    few = f.residual <= NOISE * coarser * f.rounding and np.array_equal(X, X.astype(np.float32))
+    digits = "its coordinates are in single precision, as in a .glb file, which alone leaves as much"
+    coarse = f"{f.overload}: only a mesh as coarse as this may come to rest, a finer one cannot"
+    reasons = [_residual(f), digits if few else "", f.hardly_balanced, too_long(f.surface), _compressed(f)]
+    return [*reasons, coarse if f.overload else "", *f.tried[1:]]
 
 
 def _weak_patch(f: Findings) -> str:
     name = f.surface.patches[int(f.own_residuals.argmax())].name
-    return (
-        f"the forces left in patch {name!r}, or in an island of it, are {f.own_residuals.max():.1e} of its"
-        " own, which are small beside those of the rest; solve with a smaller tolerance"
-    )
+    text = f"the forces left in patch {name!r}, or in an island of it, are {f.own_residuals.max():.1e} of its"
+    return f"{text} own, which are small beside those of the rest; solve with a smaller tolerance"
 
 
 def _hidden_forces(f: Findings) -> str:
-    return (
-        f"{_residual(f)}, but rounding of the coordinates"
-        f" alone leaves about {f.rounding:.0e}: parts that are small beside their coordinates lose their"
-        " digits; move the origin near them, or solve them by themselves"
-    )
+    text = f"{_residual(f)}, but rounding of the coordinates alone leaves about {f.rounding:.0e}: parts that"
+    text += " are small beside their coordinates lose their digits"
+    return f"{text}; move the origin near them, or solve them by themselves"
 
 
 def _hidden_stability(f: Findings) -> list[object]:
@@ -222,16 +210,14 @@ def _compressed(f: Findings) -> str:
         ends = surface.cable_edges.ends[edges[0]]
         name = next(c.name for c in surface.cables if (c.edges == np.sort(ends)).all(axis=1).any())
         place = point_text(surface.vertices[ends].mean(axis=0), surface.size)
-        return (
-            f"cable {name!r} is under compression at {place} ({len(edges)} edges of cables are): its weight"
-            " leaves τ + g z ≤ 0; raise its tension, or put Π lower"
-        )
+        text = f"cable {name!r} is under compression at {place} ({len(edges)} edges of cables are)"
+        return f"{text}: its weight leaves τ + g z ≤ 0; raise its tension, or put Π lower"
     worst = pulls.argmin()
     name = surface.patches[surface.patch_of_face[worst]].name
     place = point_text(surface.vertices[surface.faces[worst]].mean(axis=0), surface.size)
+    text = f"patch {name!r} is under compression in {len(faces)} triangles: its weight leaves α + w z ="
     return (
-        f"patch {name!r} is under compression in {len(faces)} triangles: its weight leaves α + w z ="
-        f" {pulls.min():.3g} at {place}, and a sheet buckles there; raise its tension, or put Π lower"
+        f"{text} {pulls.min():.3g} at {place}, and a sheet buckles there; raise its tension, or put Π lower"
     )
 
 
@@ -239,8 +225,9 @@ def _saddle(f: Findings) -> list[object]:
     return [describe_saddle(f.surface, f.spectrum.index or f.spectrum.below or 0, f.mode), _near_fold(f)]
 
 
-def _at_volumes(f: Findings) -> str:
-    return "in this cell" if f.surface.periodic and not f.surface.rooms else "at these volumes"
+def _free(f: Findings) -> str:
+    where = "in this cell" if f.surface.periodic and not f.surface.rooms else "at these volumes"
+    return f"nothing resists {f.rigid} rigid motions; every change of shape {where} raises E"
 
 
 def _near_fold(f: Findings) -> str:
@@ -256,8 +243,8 @@ def _near_fold(f: Findings) -> str:
 
 # a verdict, when it applies, and the reason, or its parts
 RULES: tuple[tuple[Verdict, Callable[[Findings], object], Callable[[Findings], str | list[object]]], ...] = (
-    (Verdict.NEUTRAL, lambda f: not f.surface.tensions.any(), lambda f: NO_TENSION),
-    (Verdict.NO_EQUILIBRIUM, lambda f: f.proofs, _disproved),
+    (Verdict.NEUTRAL, lambda f: not f.surface.tensions.any(), lambda f: SLACK),
+    (Verdict.NO_EQUILIBRIUM, lambda f: f.proofs, lambda f: [*f.proofs, *f.folds, f.neck]),
     (Verdict.NONE_FOUND, lambda f: f.lost and f.tried, _none_found),
     (Verdict.RAN_AWAY, lambda f: f.lost, _ran_away),
     (Verdict.WALL_DOWN, lambda f: f.moving and f.wall_down, _collapse),
@@ -269,7 +256,7 @@ RULES: tuple[tuple[Verdict, Callable[[Findings], object], Callable[[Findings], s
     (Verdict.SADDLE, lambda f: (heavy_cable_pulls(f.surface) <= 0.0).any(), _compressed),
     (Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),
     (Verdict.SADDLE, lambda f: f.spectrum.below, _saddle),
-    (Verdict.NEUTRAL, lambda f: f.rigid > 0, lambda f: FREE.format(f.rigid, _at_volumes(f))),
+    (Verdict.NEUTRAL, lambda f: f.rigid > 0, _free),
     (Verdict.NEUTRAL, lambda f: f.spectrum.soft, _near_fold),
     (Verdict.STABLE, lambda f: True, _near_fold),
 )

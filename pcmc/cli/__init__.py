@@ -17,17 +17,11 @@ M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command. The shell's ``pcmc`` calls this.
+    """Run the command. The shell's ``pcmc`` calls this; ``arguments`` are by default ``sys.argv[1:]``.
 
-    Parameters
-    ----------
-    arguments : of the command line, without the command's name; default ``sys.argv[1:]``.
-
-    Returns
-    -------
-    int : the exit code. 0: the result is certified, or a command that certifies nothing has succeeded;
-        1: the result is not certified; 2: bad input, or no command at all, which prints the help;
-        130: stopped by Ctrl-C.
+    Returns the exit code. 0: the result is certified, or a command that certifies nothing has succeeded;
+    1: the result is not certified; 2: bad input, or no command at all, which prints the help; 130: stopped
+    by Ctrl-C.
 
     >>> main(["certify", "roof.obk"])
     2

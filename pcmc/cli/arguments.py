@@ -6,6 +6,7 @@ import ast
 import inspect
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -27,55 +28,10 @@ from ..project.varied import with_loads
 from ..project.writing import check_outputs
 from ..surface import Surface
 from ..surface.values import in_the_open, sheets_below
+from .options import by_part, option, parsed_unit, switch
 
 TOML, DXF = ".toml", ".dxf"
-
-
-def option(metavar: str, meaning: str, *names: str, **more: Any) -> Any:
-    """An option of a command: what stands for its value, and its help."""
-    return typer.Option(*names, metavar=metavar, help=meaning, **more)
-
-
-def amount(metavar: str, meaning: str) -> Any:
-    """An option with a number."""
-    return option(metavar, meaning, parser=parsed_number)
-
-
-def count(meaning: str) -> Any:
-    """An option with a whole number."""
-    return option("NUMBER", meaning, parser=parsed_integer)
-
-
-def by_part(meaning: str) -> Any:
-    """An option with a value for each of some parts; see ``by_name``."""
-    return option("NAME=VALUE", meaning)
-
-
-def switch(name: str, meaning: str) -> Any:
-    """An option without a value."""
-    return typer.Option(name, help=meaning)
-
-
-def parsed_number(text: str | float) -> float:
-    """The number in an option. The error shows the text, which typer's own parser does not."""
-    try:
-        return validate.parsed(str(text))
-    except ValueError:
-        raise typer.BadParameter(f"expected a number, found {text!r}") from None
-
-
-def parsed_integer(text: str | int) -> int:
-    """The whole number in an option; see ``parsed_number``."""
-    try:
-        validate.parsed(str(text))  # which refuses 1_000
-        return int(text)
-    except ValueError:
-        raise typer.BadParameter(f"expected a whole number, found {text!r}") from None
-
-
-def parsed_unit(text: str) -> str:
-    """A unit of length in an option; empty for none."""
-    return validate.choice("--units", text, LENGTHS) if text else text
+READ = (TOML, *FORMATS, *READ_ONLY, DXF)  # suffixes of what commands read
 
 
 EVERY = "A bare VALUE applies to every patch that is not named"
@@ -95,6 +51,7 @@ ViewName = Annotated[str, option("NAME", "diagonal, elevation, plan, or AZIMUTH,
 Start = Annotated[bool, switch("--start", START)]
 Cache = Annotated[bool, switch("--cache/--no-cache", CACHE)]
 Whole = Annotated[bool, switch("--whole", WHOLE)]
+Uncertified = Annotated[bool, switch("--allow-uncertified", UNCERTIFIED)]
 MeshCheck = Annotated[bool | None, switch("--mesh-check/--no-mesh-check", MESH_CHECK)]
 FileUnits = Annotated[str, option("NAME", UNITS, parser=parsed_unit)]
 SHEET = "Format of the sheets: A4, A3, A2, A1 or A0; by default the project's, or A1."
@@ -132,8 +89,9 @@ class Loads:
         names |= {"weight": sheets, "snow": [name for name in loaded if name in out]}
         names |= {key: [cable.name for cable in surface.cables] for key in ("cable", "cable_weight")}
         names |= {"volume": [room.name for room in surface.rooms]}
-        flags = {key: f"--{key.replace('_', '-')}" for key in names}
-        given = {f"{key}s": by_name(own, getattr(self, key), flags[key]) for key, own in names.items()}
+        given = {}
+        for key, own in names.items():
+            given[f"{key}s"] = by_name(own, getattr(self, key), f"--{key.replace('_', '-')}")
         return with_loads(surface, given)
 
 
@@ -158,22 +116,20 @@ class Build:
 
     whole: Whole = False
     cache: Cache = True
-    allow_uncertified: Annotated[bool, switch("--allow-uncertified", UNCERTIFIED)] = False
+    allow_uncertified: Uncertified = False
 
     def roof(self, project: Project, progress: OnStep) -> Outcome:
         """The roof of a project; one that misses its targets is refused, unless it may be uncertified."""
         roof, file = Shown(cache=self.cache).roof(project, progress, self.whole), project.path
         if roof.certified and not roof.good and not self.allow_uncertified:
             hint = f"pcmc solve {file} shows them, --allow-uncertified accepts the roof"
-            text = f"{file}: the roof misses its targets or its accuracy; {hint}"
-            raise FileError(text, what=str(file))
+            raise FileError(f"{file}: the roof misses its targets or its accuracy; {hint}", what=str(file))
         return roof
 
 
 def with_groups(function: Callable[..., int]) -> Callable[..., int]:
     """A command as typer reads it: a parameter of a dataclass becomes an option for each of its fields."""
-    parameters: list[inspect.Parameter] = []
-    groups: dict[str, Any] = {}
+    parameters, groups = list[inspect.Parameter](), dict[str, Any]()
     for name, parameter in inspect.signature(function, eval_str=True).parameters.items():
         if is_dataclass(group := parameter.annotation):
             groups[name], kinds = group, get_type_hints(group, include_extras=True)
@@ -208,10 +164,9 @@ def output_of(file: Path, **output: Any) -> Output:
 
 def check_suffix(file: Path) -> None:
     """Refuse a file whose suffix is neither a project's nor a drawing's nor a surface's."""
-    suffix, known = file.suffix.lower(), (TOML, *FORMATS, *READ_ONLY, DXF)
-    if suffix not in known:
+    if (suffix := file.suffix.lower()) not in READ:
         check_regular(file)
-        raise FileError(f"{file}: {unknown('suffix', suffix, known)}", what=str(file))
+        raise FileError(f"{file}: {unknown('suffix', suffix, READ)}", what=str(file))
 
 
 def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, float]:
@@ -223,10 +178,9 @@ def by_name(names: list[str], given: list[str] | None, flag: str) -> dict[str, f
     values: dict[bool, dict[str, float]] = {False: {}, True: {}}  # by whether each is named
     for text in given or ():
         name, sign, value = text.rpartition("=")
-        try:
+        amount = math.nan
+        with suppress(ValueError):
             amount = validate.parsed(value)
-        except ValueError:
-            amount = math.nan
         if (sign and not name) or math.isnan(amount):
             validate.refuse(flag, text, "NAME=NUMBER or NUMBER")
         if not (name or names):
@@ -253,14 +207,10 @@ def named_values(text: str) -> tuple[str, list[Any]]:
 
 
 def _value(text: str) -> Any:
-    words = {"true": True, "false": False, "none": None}
-    if text.lower() in words:
-        return words[text.lower()]
-    try:
-        number = ast.literal_eval(text)
-    except (ValueError, SyntaxError):
-        return text
-    return number if isinstance(number, int | float) else text
+    with suppress(ValueError, SyntaxError):
+        value = ast.literal_eval(text.capitalize() if text.lower() in ("true", "false", "none") else text)
+        return value if isinstance(value, int | float | None) else text
+    return text
 
 
 def check_start(start: bool, file: Path) -> None:
@@ -274,21 +224,18 @@ def numbers(
     text: str, flag: str, expected: str = "numbers, with commas between them", size: int = 0
 ) -> list[float]:
     """The numbers in X,Y,..., which must be ``size`` if that is not 0."""
-    try:
+    with suppress(ValueError):
         found = [validate.parsed(part) for part in text.split(",")]
-    except ValueError:
-        found = []
-    if not found or (size and len(found) != size):
-        validate.refuse(flag, text, expected)
-    return found
+        if not size or len(found) == size:
+            return found
+    validate.refuse(flag, text, expected)
 
 
 def parsed_view(text: str, picture: Path | None) -> Any:
     """The name of a view of a picture, or (azimuth, elevation)."""
     if picture is None and text != "diagonal":
         raise OptionError("--view: is of the picture; give --picture, too, or leave it out", what="--view")
-    try:
+    with suppress(ValueError):
         azimuth, elevation = map(validate.parsed, text.split(","))
-    except ValueError:
-        return text
-    return azimuth, elevation
+        return azimuth, elevation
+    return text

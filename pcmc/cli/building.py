@@ -1,4 +1,4 @@
-"""The commands panels, draw, report and structure. Each returns the exit code."""
+"""The commands panels, draw, report, structure and pattern. Each returns the exit code."""
 
 from __future__ import annotations
 
@@ -13,33 +13,22 @@ from ..base.errors import FileError, OptionError
 from ..base.files import suffix_of
 from ..base.units import Units
 from ..certificate.certificate import require_certified
+from ..cloth import CuttingOptions
+from ..cloth.sheets import pattern_files
 from ..drawings.drawing_set import NET_SUFFIXES, NET_TABLES, net_files, table_paths
 from ..io import FORMATS, write
 from ..panelling.panel_net import check_grid
-from ..plot import families, panel_planarity
+from ..plot import families, panel_planarity, strains
 from ..project.drawn import files_of
-from ..project.settings import Output, Structure, cost_paths, schedule_paths
+from ..project.settings import Output, Structure, cost_paths, of_material, schedule_paths
 from ..project.writing import analysis_jobs, check_outputs, cost_jobs, model_job, schedule_jobs, write_all
 from ..structure import analyse
 from ..structure.calculix import expect_program
 from ..structure.columns import column_text, columns_at_rest
 from ..structure.member_forces import cable_notes, cable_offers, sentences
 from . import arguments, reports
-from .arguments import (
-    MANY_FILES,
-    OUTPUT,
-    Build,
-    FileUnits,
-    Input,
-    MeshCheck,
-    SheetFormat,
-    ViewName,
-    amount,
-    count,
-    option,
-    parsed_number,
-    switch,
-)
+from .arguments import MANY_FILES, OUTPUT, Build, FileUnits, Input, MeshCheck, SheetFormat, ViewName
+from .options import amount, count, option, parsed_number, switch
 from .reports import working
 
 CSV = ".csv"
@@ -47,12 +36,7 @@ FAMILY = "Largest difference of edges within a family of triangles."
 PATTERN = "planar-quads along lines of curvature; quads or hexagons of a grid in plan."
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
 COST = "Cost of a family, as of its mould, and of a panel; adds NAME-costs.csv and .svg. Needs --change."
-PICTURE = "Picture to draw, coloured by family."
-MIRRORED = "alike: of one family; or apart."
-TOLERANCE = (
-    "Largest difference of edges within a family of panels; adds the schedule. By default the project's."
-)
-HEIGHT = "Section at this height; may be repeated."
+ALIKE = "Largest difference of edges within a family of panels; adds the schedule. By default the project's."
 TWO = "two numbers FAMILY,PANEL, 0 or more"
 LINE, FOUR = "Section along this line; may be repeated.", "four numbers X,Y,X,Y"
 TRUE_SIZE = "Draw every panel at true size, as a project may say, too; needs --tolerance."
@@ -61,9 +45,8 @@ DATE = "Date to print; by default the project's. No clock is read."
 THICKNESS = "Thickness of a patch; a bare VALUE applies to every patch that is not named."
 DENSITY = "Mass per volume; above 0, self-weight is a load."
 RUN = "Run CalculiX on each case and combination; by default as the project says."
-SNOW = "Load per plan area, besides the snow of the form."
 WIND = "Wind pressure on a patch, above 0 for suction on a roof; may be repeated."
-Tolerance = Annotated[float | None, amount("LENGTH", TOLERANCE)]
+Tolerance = Annotated[float | None, amount("LENGTH", ALIKE)]
 
 
 def panels_(
@@ -71,7 +54,7 @@ def panels_(
     file: Input,
     tolerance: Annotated[float | None, amount("LENGTH", FAMILY)] = None,
     output: Annotated[list[Path] | None, MANY_FILES] = None,
-    picture: Annotated[Path | None, option("PNG", PICTURE)] = None,
+    picture: Annotated[Path | None, option("PNG", "Picture to draw, coloured by family.")] = None,
     view: ViewName = "diagonal",
     pattern: Annotated[str | None, option("NAME", PATTERN)] = None,
     size: Annotated[float | None, amount("LENGTH", "Edge of the panels of a pattern.")] = None,
@@ -80,7 +63,7 @@ def panels_(
     sheet: SheetFormat = None,
     change: Annotated[float | None, amount("LENGTH", CHANGE)] = None,
     cost: Annotated[str | None, option("FAMILY,PANEL", COST)] = None,
-    mirror_images: Annotated[str, option("NAME", MIRRORED)] = "alike",
+    mirror_images: Annotated[str, option("NAME", "alike: of one family; or apart.")] = "alike",
     walls: Annotated[bool, switch("--walls", "Triangles of walls are panels, too.")] = False,
     build: Build,
 ) -> int:
@@ -110,7 +93,7 @@ def panels_(
         if pattern is None or size is None:
             text = "--pattern: needs a --size, and --size a --pattern: planar-quads, quads or hexagons"
             raise OptionError(text, what="--size", expected="a length")
-        return _net(file, units, files, picture, seen, sheet, build, (size, pattern, direction))
+        return _net(file, files, picture, seen, build, (size, pattern, direction, units, sheet))
     if tolerance is None:
         text = "--tolerance: panels of triangles need it; quads and hexagons need --pattern and --size"
         raise OptionError(text, what="--tolerance", expected="a length")
@@ -130,26 +113,23 @@ def panels_(
         outputs += schedule_paths(path) if suffix == CSV else [path]
         outputs += cost_paths(path) if suffix == CSV and prices is not None else []
     check_outputs(outputs, inputs=files_of(file))
-    options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
-    options["anyway"] = build.allow_uncertified
+    how: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": build.allow_uncertified}
     with working() as progress:
         roof = build.roof(arguments.load_project(file), progress)
         progress("sorting panels")
         if change is None:
-            schedule = roof.panels(tolerance, **options)
+            schedule = roof.panels(tolerance, **how)
         else:
-
-            def callback(made: int, count: int) -> None:
-                progress(f"round {made}: {count} families")
-
-            fewer = roof.fewer_families(tolerance, change, callback=callback, **options)
+            how["callback"] = lambda made, count: progress(f"round {made}: {count} families")
+            fewer = roof.fewer_families(tolerance, change, **how)
             schedule = fewer.after
         works: list[Any] = []
-        writing = partial(write, surface=schedule.surface, units=roof.units)
         for path in files:
-            is_table = path.suffix.lower() == CSV
-            works += schedule_jobs(path, schedule) if is_table else [(path, writing)]
-            works += cost_jobs(path, fewer.costs(*prices)) if is_table and prices is not None else []
+            if path.suffix.lower() == CSV:
+                works += schedule_jobs(path, schedule)
+                works += cost_jobs(path, fewer.costs(*prices)) if prices is not None else []
+            else:
+                works.append((path, partial(write, surface=schedule.surface, units=roof.units)))
         if picture is not None:
             works.append((picture, partial(families, schedule, view=seen)))
         written = write_all(works, progress)
@@ -158,25 +138,17 @@ def panels_(
         print(f"\n{fewer}")
     if prices is not None:
         table = fewer.costs(*prices)
-        marked = table.assign(cheapest=table["cheapest"].map({True: "cheapest", False: ""}))
-        print(f"\n{marked.rename(columns={'cheapest': ''}).to_string(index=False, float_format='%.6g')}")
+        table[""] = table.pop("cheapest").map({True: "cheapest", False: ""})
+        print(f"\n{table.to_string(index=False, float_format='%.6g')}")
     return reports.ended(schedule.certificate.certified and roof.good, written)
 
 
 def _net(
-    file: Path,
-    units: str,
-    files: list[Path],
-    picture: Path | None,
-    seen: Any,
-    sheet: str | None,
-    build: Build,
-    wanted: tuple[float, str, float],
+    file: Path, files: list[Path], picture: Path | None, seen: Any, build: Build, about: tuple[Any, ...]
 ) -> int:
-    """Lay out quads or hexagons and write them."""
     for path in files:
         suffix_of(path, NET_SUFFIXES, "a net of panels")
-    size, pattern, direction = wanted
+    size, pattern, direction, units, sheet = about
     check_grid(pattern, direction)
     outputs = Output(picture=picture, view=seen, sheet=sheet or "A1").paths
     outputs += [one for path in files for one in table_paths(path, NET_TABLES)]
@@ -200,7 +172,7 @@ def draw_(
     units: FileUnits = "",
     sheet: SheetFormat = None,
     scale: Annotated[int | None, count("1 to this; by default it fits.")] = None,
-    height: Annotated[list[str] | None, option("Z", HEIGHT)] = None,
+    height: Annotated[list[str] | None, option("Z", "Section at this height; may be repeated.")] = None,
     line: Annotated[list[str] | None, option("X,Y,X,Y", LINE)] = None,
     tolerance: Tolerance = None,
     panel_sheets: Annotated[bool, switch("--panel-sheets", TRUE_SIZE)] = False,
@@ -214,14 +186,13 @@ def draw_(
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
     arguments.output_of(file, drawings=output)
-    heights = None if height is None else [parsed_number(text) for text in height]
     points = [arguments.numbers(text, "--line", FOUR, 4) for text in line or ()]
-    lines = None if line is None else [((a, b), (c, d)) for a, b, c, d in points]
+    options: dict[str, Any] = {"scale": scale, "heights": height and [parsed_number(text) for text in height]}
+    options["lines"] = line and [((a, b), (c, d)) for a, b, c, d in points]
     with working() as progress:
         roof = build.roof(arguments.load_project(file, units), progress)
         progress("drawing")
         documents = _documents(roof, sheet=sheet, tolerance=tolerance, panel_sheets=panel_sheets or None)
-        options = {"scale": scale, "heights": heights, "lines": lines}
         drawings = roof.drawing_set(documents, anyway=build.allow_uncertified, **options)
         written = write_all(drawings.files(*output), progress)
     print(f"{len(drawings.sheets)} sheets {drawings.sheets[0].format}", end="; ")
@@ -249,14 +220,13 @@ def report_(
     arguments.output_of(file, report=output)
     anyway = build.allow_uncertified
     with working() as progress:
-        project = arguments.load_project(file, units)
-        roof = build.roof(project, progress)
-        if force and roof.units.force not in ("", force):
-            own = roof.units.force
+        roof = build.roof(arguments.load_project(file, units), progress)
+        own = roof.units.force
+        if force and own not in ("", force):
             text = f"--force: the forces of {file.name} are in {own}, not in {force}; leave out --force"
             raise OptionError(text, what="--force", found=force, expected=own)
         progress("certifying")
-        roof = replace(roof, units=Units(roof.units.length, force or roof.units.force))
+        roof = replace(roof, units=Units(roof.units.length, force or own))
         require_certified(roof.shown.certificate, anyway)
     reports.mesh_check(roof, mesh_check)
     reports.margins(roof)
@@ -264,8 +234,7 @@ def report_(
         progress("laying out the pages")
         documents = _documents(roof, tolerance=tolerance, date=date)
         listed = {file.name: "project" if roof.result is not None else "surface"}
-        report = roof.report(documents, files=listed, anyway=anyway)
-        written = write_all([(output, report.write)], progress)
+        written = write_all([(output, roof.report(documents, files=listed, anyway=anyway).write)], progress)
     return reports.ended(roof.good, written)
 
 
@@ -283,7 +252,7 @@ class Model:
     poisson: Annotated[float | None, amount("VALUE", "Poisson's ratio, 0.3 by default.")] = None
     density: Annotated[float | None, amount("VALUE", DENSITY)] = None
     gravity: Annotated[float | None, amount("VALUE", "Length/s²; by default 9.81 m/s².")] = None
-    snow: Annotated[float | None, amount("VALUE", SNOW)] = None
+    snow: Annotated[float | None, amount("VALUE", "Load per plan area, besides the snow of the form.")] = None
     wind: Annotated[list[str] | None, option("NAME=VALUE", WIND)] = None
     cable_area: Annotated[float | None, amount("VALUE", "Section of the cables.")] = None
 
@@ -301,8 +270,7 @@ def structure(
     A project is solved first; its [structure] has the values that no option gives. With --run each case and
     combination is analysed: NAME-cases.csv, NAME-patches.csv, NAME-supports.csv, NAME-cables.csv,
     NAME-members.csv, NAME-member-forces.csv, NAME-columns.csv, NAME-cases.png and NAME-member-forces.png come
-    beside the model.
-    A case that is not carried as a whole ends with the code 1.
+    beside the model. A case that is not carried as a whole ends with the code 1.
 
     \b
     Examples:
@@ -336,11 +304,94 @@ def structure(
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     if analysis is None:
-        lines = [*cable_notes(model), *sentences(model, model.units), *cable_offers(model)]
-        print(*lines, sep="\n", end="\n" * bool(lines))
+        for line in (*cable_notes(model), *sentences(model, model.units), *cable_offers(model)):
+            print(line)
         if model.bars:
             print(column_text(model, columns_at_rest(model), model.units))
         print(f"written: {output}; run it with: ccx {output.with_suffix('')}")
         return reports.ended(roof.good)
     print(analysis)
     return reports.ended(roof.good and analysis.carried, written)
+
+
+WIDTH = "Width of the cloth: no strip is wider, with its allowances."
+SEAM = "A seam from point to point along geodesics, instead of others there; may be repeated."
+DIRECTION = "Of the warp in the plan, degrees from x; by default along the longer side of each sheet."
+COMPENSATION = "Percent by which the cloth is cut shorter along warp and weft."
+STIFFNESS = "Force per length of warp and weft, from which the compensation follows."
+NOTCHES = "Distance of the marks along seams, 0 for none; by default the mean width of strips."
+STRIPS = "Picture to draw: the strips on the roof, coloured by strain."
+
+
+@dataclass(frozen=True)
+class Cutting:
+    """What the command line says of a cutting pattern, instead of the project."""
+
+    width: Annotated[float | None, amount("LENGTH", WIDTH)] = None
+    strips: Annotated[int | None, count("Number of strips of each sheet, instead of a width.")] = None
+    seam: Annotated[list[str] | None, option("X,Y,X,Y", SEAM)] = None
+    direction: Annotated[float | None, amount("DEGREES", DIRECTION)] = None
+    compensation: Annotated[str | None, option("WARP,WEFT", COMPENSATION)] = None
+    stiffness: Annotated[str | None, option("WARP,WEFT", STIFFNESS)] = None
+    poisson: Annotated[float | None, amount("NUMBER", "Contraction of the weft, 0.3 by default.")] = None
+    allowance: Annotated[float | None, amount("LENGTH", "Cloth added outside of seams.")] = None
+    hem: Annotated[float | None, amount("LENGTH", "Cloth added at rims; by default the allowance.")] = None
+    notches: Annotated[float | None, amount("LENGTH", NOTCHES)] = None
+
+    def of(self, own: CuttingOptions | None) -> CuttingOptions:
+        """The pattern of a project with these values."""
+        values: dict[str, Any] = {} if own is None else dict(vars(own))
+        given = {name: value for name, value in vars(self).items() if value not in (None, [])}
+        for pair in ({"width", "strips"}, {"compensation", "stiffness"}):  # one or the other
+            if len(pair & given.keys()) == 1:
+                values = {name: value for name, value in values.items() if name not in pair}
+        for name in {"compensation", "stiffness"} & given.keys():
+            given[name] = arguments.numbers(given[name], f"--{name}")
+        if "seam" in given:
+            lines = [arguments.numbers(text, "--seam") for text in given.pop("seam")]
+            for line in lines:
+                if len(line) % 2 or len(line) < 4:
+                    validate.refuse("--seam", ",".join(map(str, line)), "points X,Y,X,Y and so on")
+            given["seams"] = [[line[k : k + 2] for k in range(0, len(line), 2)] for line in lines]
+        return CuttingOptions(**(values | given))
+
+
+def pattern(
+    *,
+    file: Input,
+    output: Annotated[list[Path] | None, MANY_FILES] = None,
+    picture: Annotated[Path | None, option("PNG", STRIPS)] = None,
+    view: ViewName = "diagonal",
+    given: Cutting,
+    sheet: SheetFormat = None,
+    units: FileUnits = "",
+    build: Build,
+) -> int:
+    """Cut a roof into strips of cloth and lay them flat; write sheets and tables.
+
+    A .dxf has all strips at true size with allowances, seams, notches and labels; .pdf and .svg have sheets
+    to scale; a .csv has the table of strips, beside it comes NAME-seams.csv. A project is solved first;
+    its [pattern] has the values that no option gives.
+
+    \b
+    Examples:
+      pcmc pattern roof.toml --width 2.4 -o cloth.dxf -o cloth.pdf
+      pcmc pattern roof.toml --width 2.4 --compensation 0.4,1.5 --allowance 0.04 -o cloth.csv
+    """
+    seen, files = arguments.parsed_view(view, picture), output or []
+    arguments.output_of(file, pattern=files, picture=picture, view=seen)
+    with working() as progress:
+        project = arguments.load_project(file, units)
+        wanted, sheet = given.of(project.pattern), sheet or project.output.sheet
+        start = projects.start_of(project)
+        replace(project.output, pattern=files).check(start.units, project.structure, wanted)
+        of_material(wanted, project.structure, start.surface)
+        roof = build.roof(project, progress)
+        progress("cutting strips")
+        cloth = roof.cutting_pattern(wanted, build.allow_uncertified)
+        jobs: list[Any] = pattern_files(cloth, files, roof.units, sheet, roof.name, roof.mark)
+        if picture is not None:
+            jobs.append((picture, partial(strains, cloth, view=seen)))
+        written = write_all(jobs, progress)
+    print(cloth.text(roof.units))
+    return reports.ended(roof.good, written)

@@ -16,6 +16,8 @@ from ..base.errors import FileError, FileWarning, OptionError, unknown
 from ..base.files import atomic_write, suffix_of
 from ..base.interrupts import defer_interrupts
 from ..base.units import LENGTHS
+from ..explore import open_and_wait, start
+from ..explore.roof import ShownRoof, read_roof
 from ..io import metres_note, write
 from ..io.repairing import HOLES, repair
 from ..project import Outcome, cache
@@ -23,24 +25,10 @@ from ..project.planning import drawing_reference
 from ..project.settings import check_names
 from ..project.writing import check_outputs, picture_job, surface_files, write_all
 from ..surface import Surface
+from ..sweep.case_script import resolve
 from . import NOT_CERTIFIED, OK, arguments, reports
-from .arguments import (
-    OUTPUT,
-    TOML,
-    Cache,
-    FileUnits,
-    Input,
-    Shown,
-    Start,
-    ViewName,
-    Whole,
-    amount,
-    count,
-    load_project,
-    option,
-    parsed_unit,
-    switch,
-)
+from .arguments import OUTPUT, TOML, Cache, FileUnits, Input, Shown, Start, ViewName, Whole, load_project
+from .options import amount, count, option, parsed_unit, switch
 from .reports import working
 
 OUT = "File to write; its suffix selects the format."
@@ -69,8 +57,7 @@ def convert(
       pcmc convert roof.pcmc roof.glb --colour error
     """
     arguments.output_of(file, files=[output])
-    roof = _good(file, what, whole, units)
-    if roof is None:
+    if (roof := _good(file, what, whole, units)) is None:
         return NOT_CERTIFIED
     written = write_all(surface_files(roof, [output], colour))
     print(*(f"{note}\n" for note in metres_note([output], roof.units.length)), sep="", end="")
@@ -108,8 +95,7 @@ def plot(
     """
     seen = arguments.parsed_view(view, picture)
     arguments.output_of(file, picture=picture, view=seen, colour=colour)
-    roof = _good(file, what, whole)
-    if roof is None:
+    if (roof := _good(file, what, whole)) is None:
         return NOT_CERTIFIED
     return reports.ended(True, write_all([picture_job(roof, picture, [seen], colour)]))
 
@@ -133,18 +119,14 @@ def explore(
       pcmc explore roof.toml --watch
       pcmc explore --example two_caps --set edge_length=1.2
     """
-    from ..explore import open_and_wait, start
-    from ..explore.roof import ShownRoof, read_roof
 
     if (file is None) == (example is None):
         raise OptionError("explore: give a file or --example, one of them", what="--example")
-    for flag, given, wanted, needs in (
-        ("--watch", watch, file, "a file"),
-        ("--start", start_shape, file, "a file"),
-        ("--set", parameter, example, "an --example"),
-    ):
+    needs: dict[str, Any] = {"--watch": (watch, file, "a file"), "--start": (start_shape, file, "a file")}
+    needs["--set"] = parameter, example, "an --example"
+    for flag, (given, wanted, need) in needs.items():
         if given and wanted is None:
-            raise OptionError(f"explore: {flag} needs {needs}", what=flag)
+            raise OptionError(f"explore: {flag} needs {need}", what=flag)
     again = None
     with working() as progress:
         progress("building")
@@ -167,12 +149,10 @@ def explore(
 
 
 def _example(name: str, parameters: dict[str, Any]) -> Surface:
-    """The surface of a generator, named 'two_caps' or 'package.module:function'."""
-    from ..sweep.case_script import resolve
 
     try:
-        known: Any = () if ":" in name else resolve("generators:__all__")
-        if ":" not in name and name not in known:
+        known: Any = [name] if ":" in name else resolve("generators:__all__")
+        if name not in known:
             raise OptionError(unknown("example", name, known), what="--example", found=name)
         build = resolve(name if ":" in name else f"generators:{name}")
         inspect.signature(build).bind(**parameters)
@@ -189,7 +169,6 @@ REFER = "Refer to the drawing, so that the project follows it."
 MESH = "A mesh: .obj .ply .stl .off .dae .3ds .x3d and others."
 WELD = "Vertices nearer to each other than this become one; by default 1e-5 of the mesh's size."
 UNITS = "Unit of length wanted: m, cm, mm, ft or in; a file without one is taken to be in it."
-CLOSED = "Edges of the largest hole that is closed; 0 closes none."
 UP = "The axis that was up where the mesh was drawn: x, y or z; it is turned to be z."
 NEW_LENGTH = "Edge length of new triangles, for a scan; otherwise the triangles stay."
 
@@ -212,8 +191,7 @@ def plan(
     """
     suffix_of(output, (TOML,), "a project")
     if output.exists():
-        text = f"{output}: is there already; delete it, or name another file"
-        raise FileError(text, what=str(output))
+        raise FileError(f"{output}: is there already; delete it, or name another file", what=str(output))
     check_outputs([output])
     if refer:
         drawing_reference(file, output)  # refuses a drawing elsewhere
@@ -232,7 +210,7 @@ def repair_(
     file: Annotated[Path, typer.Argument(metavar="FILE", help=MESH)],
     output: Annotated[Path, option("FILE", "File to write.", *OUTPUT)],
     weld: Annotated[float | None, amount("LENGTH", WELD)] = None,
-    holes: Annotated[int, count(CLOSED)] = HOLES,
+    holes: Annotated[int, count("Edges of the largest hole that is closed; 0 closes none.")] = HOLES,
     edge_length: Annotated[float | None, amount("LENGTH", NEW_LENGTH)] = None,
     units: Annotated[str, option("NAME", UNITS, parser=parsed_unit)] = "",
     up: Annotated[str, option("AXIS", UP)] = "z",

@@ -8,17 +8,20 @@ from typing import Annotated, Any
 
 from .. import project as projects
 from ..base.errors import OptionError
+from ..equilibria import find_equilibria
+from ..plot import equilibria as diagram
+from ..plot.uses import BRANCH_VALUES
 from ..project.drawn import files_of
 from ..project.members import warn_of_members
 from ..project.writing import certified_files, check_outputs, write_all
 from . import arguments, reports
-from .arguments import MANY_FILES, FileUnits, Input, Shown, Whole, count, load_project, option, switch
+from .arguments import MANY_FILES, FileUnits, Input, Shown, Whole, load_project
+from .options import count, option, switch
 from .reports import working
 
 ALONG = "Follow branches in: pressure, snow, weight, volume, or such as 'tension of west'; may be repeated."
 SPAN = "Least and largest factor on it; by default 0.5,1.5. Of what is 0 now, least and largest value."
 FACTORS = "LOW,HIGH such as 0.5,1.5"
-STARTS = "Starts of deflated Newton around each equilibrium."
 CHECK = "Check the mesh of each: whether finer meshes have it, too."
 VERTICAL = "Vertical axis of the diagram: height, energy or volume."
 PICTURES, TABLE = (".png", ".svg", ".pdf"), ".csv"
@@ -30,7 +33,7 @@ def equilibria_(
     output: Annotated[list[Path] | None, MANY_FILES] = None,
     along: Annotated[list[str] | None, option("NAME", ALONG)] = None,
     span: Annotated[str | None, option("LOW,HIGH", SPAN)] = None,
-    starts: Annotated[int, count(STARTS)] = 6,
+    starts: Annotated[int, count("Starts of deflated Newton around each equilibrium.")] = 6,
     seed: Annotated[int, count("Seed of these starts.")] = 0,
     axis: Annotated[str, option("NAME", VERTICAL)] = "height",
     mesh_check: Annotated[bool, switch("--mesh-check", CHECK)] = False,
@@ -49,9 +52,6 @@ def equilibria_(
       pcmc equilibria roof.toml -o diagram.svg
       pcmc equilibria roof.toml --along pressure --along "tension of hall" -o table.csv -o roof.pcmc
     """
-    from ..equilibria import find_equilibria
-    from ..plot import equilibria as diagram
-    from ..plot.uses import BRANCH_VALUES
 
     files = output or []
     surfaces = [path for path in files if path.suffix.lower() not in (*PICTURES, TABLE)]
@@ -84,5 +84,4 @@ def equilibria_(
 
 
 def _numbered(path: Path, number: int) -> Path:
-    """The file of an equilibrium."""
     return path.with_name(f"{path.stem}-{number}{path.suffix}")

@@ -8,18 +8,15 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..certificate.tables import lean_texts
+from ..plan.lines import SNAP, is_straight
 from ..project.advising import Changed, firmer
 from ..project.outcome import MOST_CHECKED, Outcome
 from . import NOT_CERTIFIED, OK
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
 FAR = 10.0  # degrees: walls that lean less are not reported
-NO_CHECK = "no mesh check: the surface is not at rest"
 
 
 def report(outcome: Outcome, *, verdict: bool = True) -> None:
@@ -68,7 +65,6 @@ def _against_lean(outcome: Outcome) -> str:
     plan = None if outcome.project is None else outcome.project.plan
     if plan is None:
         return limit
-    from ..plan.lines import SNAP, is_straight  # needs shapely, as the plan's mesh did
 
     table = outcome.certificate.leaning
     far = set(table["wall"][table["lean"] >= FAR])
@@ -88,10 +84,11 @@ def mesh_check(
     """Check the mesh of a roof at rest, if that is wanted, and look for advice; print why not, or what is
     to be ``shown``, "brief" or "text", and what to type."""
     if not roof.wants_mesh_check(wanted):
-        if roof.certificate.index is not None and roof.mesh_check_wanted(wanted) is None:
+        asked, at_rest = roof.mesh_check_wanted(wanted), roof.certificate.index is not None
+        if at_rest and asked is None:
             print(f"mesh check left out above {MOST_CHECKED} triangles; --mesh-check does it")
-        elif roof.mesh_check_wanted(wanted) and roof.certificate.index is None:
-            print(NO_CHECK)
+        elif asked and not at_rest:
+            print("no mesh check: the surface is not at rest")
         return
     print(end="", flush=True)
     with working() as progress:
@@ -132,18 +129,15 @@ def working() -> Iterator[Callable[[str], None]]:
     from rich import progress
     from rich.console import Console
 
-    columns = (
-        progress.BarColumn(20),
-        progress.TimeElapsedColumn(),
-        progress.TextColumn("{task.description}", markup=False),
-    )
+    step = progress.TextColumn("{task.description}", markup=False)
+    columns = (progress.BarColumn(20), progress.TimeElapsedColumn(), step)
     with progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
         yield lambda step: bar.update(task, description=step)
 
 
 @contextmanager
-def sweeping(console: Console | None = None) -> Iterator[Callable[[Any], None] | None]:
+def sweeping(console: Any = None) -> Iterator[Callable[[Any], None] | None]:
     """A function of a sweep's Progress that draws cases, time left and verdicts; None without a terminal."""
     if console is None and not _live():
         yield None

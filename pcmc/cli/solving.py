@@ -4,49 +4,35 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from .. import project as projects
 from ..accuracy.adaptive import TRIANGLES
+from ..accuracy.varied import Varied
 from ..base import validate
 from ..base.errors import OptionError
 from ..base.files import suffix_of
 from ..base.libraries import require
-from ..io import FORMATS, READ_ONLY
+from ..certificate.quantities import dimension_of
+from ..io import FORMATS
 from ..project import Outcome, Project
+from ..project.advising import Changed
 from ..project.drawn import files_of
 from ..project.file import with_rise
 from ..project.planning import proposal_text
 from ..project.settings import check_names
 from ..project.writing import check_outputs, surface_files, write_all
-from . import INTERRUPTED, NOT_CERTIFIED, OK, reports
-from .arguments import (
-    DXF,
-    MANY_FILES,
-    TOML,
-    UNCERTIFIED,
-    Cache,
-    FileUnits,
-    Input,
-    Loads,
-    MeshCheck,
-    Shown,
-    Whole,
-    amount,
-    count,
-    load_project,
-    named_values,
-    option,
-    output_of,
-    switch,
-)
+from ..sweep import Sweep, draw_sweep, run, short_table, solve_case, write_table
+from ..sweep.projects import column_labels, project_sweep
+from ..sweep.solving import digest_of
+from ..sweep.store import FAILED
+from ..sweep.tables import TABLES, columns_of
+from . import INTERRUPTED, NOT_CERTIFIED, OK, arguments, reports
+from .arguments import MANY_FILES, READ, Cache, FileUnits, Input, Loads, MeshCheck, Shown, Uncertified, Whole
+from .options import amount, count, option, switch
 from .reports import sweeping, working
-
-if TYPE_CHECKING:
-    from ..project.advising import Changed
-    from ..sweep import Sweep
 
 TARGET = "minimum, or stationary to accept saddles too (newton only)."
 MESHES = "Check the mesh on this many meshes in all, 3 for error bars and orders."
@@ -57,7 +43,6 @@ ACCURACY_OF = "mesh: the value on the mesh is to be so accurate; limit: the extr
 MOST_TRIANGLES = f"The most that the mesh for an accuracy may have, {TRIANGLES} by default."
 WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that are not symmetric count, too."
 RISE = "Find the tension with which the whole roof rises so much over its outline."
-APEX = "The same, over the plane."
 SPAN_RATIO = "The same: the span of the plan, the diameter of the largest circle in it, over the rise."
 MARGIN = "How far from the edge: pressure, snow, weight, or such as 'tension of west'; may be repeated."
 SWAP = (
@@ -79,10 +64,10 @@ def solve_(
     loads: Loads,
     swap: Annotated[list[str] | None, option("NAME", SWAP)] = None,
     rise: Annotated[float | None, amount("LENGTH", RISE)] = None,
-    apex: Annotated[float | None, amount("LENGTH", APEX)] = None,
+    apex: Annotated[float | None, amount("LENGTH", "The same, over the plane.")] = None,
     span_ratio: Annotated[float | None, amount("NUMBER", SPAN_RATIO)] = None,
     folder: Annotated[Path | None, option("FOLDER", "Folder for a project's output.")] = None,
-    allow_uncertified: Annotated[bool, switch("--allow-uncertified", UNCERTIFIED)] = False,
+    allow_uncertified: Uncertified = False,
     accuracy: Annotated[list[str] | None, option("QUANTITY=NUMBER", ACCURACY)] = None,
     accuracy_of: Annotated[str | None, option("NAME", ACCURACY_OF)] = None,
     most_triangles: Annotated[int | None, count(MOST_TRIANGLES)] = None,
@@ -105,7 +90,7 @@ def solve_(
       pcmc solve sail.toml --cable "cable 1=12"
       pcmc solve mesh.obj --tension 4 --tension wall=1.5 -o roof.3dm
     """
-    project = load_project(file, units).in_folder(file.parent if folder is None else folder)
+    project = arguments.load_project(file, units).in_folder(file.parent if folder is None else folder)
     own = project.output
     own = replace(own, files=output or own.files, picture=picture or own.picture, whole=whole or own.whole)
     if folder is not None and not any(path.is_relative_to(folder) for path in own.paths):
@@ -118,15 +103,11 @@ def solve_(
         options["target"] = target
     given: dict[str, Any] = {"accuracy_of": accuracy_of, "most_triangles": most_triangles}
     given["accuracy"] = ", ".join(accuracy) if accuracy else None
-    project = replace(
-        project,
-        options=options,
-        wanted=replace(project.wanted, **{name: value for name, value in given.items() if value is not None}),
-        mesh_check=project.mesh_check if mesh_check is None else mesh_check,
-        verify=verify or project.verify,
-        swap=swap or (),
-        output=own,
-    )
+    wanted = replace(project.wanted, **{name: value for name, value in given.items() if value is not None})
+    asked: dict[str, Any] = {"options": options, "wanted": wanted, "output": own}
+    asked |= {"verify": verify or project.verify, "swap": swap or ()}
+    asked["mesh_check"] = project.mesh_check if mesh_check is None else mesh_check
+    project = replace(project, **asked)
     if project.specified and not project.has_file:  # a drawing alone
         print(proposal_text(project))
     with working() as progress:
@@ -170,10 +151,8 @@ def certify_(
     if meshes is not None:
         validate.integer("--meshes", meshes, least=2)
     with working() as progress:
-        project = load_project(file)
+        project = arguments.load_project(file)
         if margin:  # unknown names are refused before the work
-            from ..accuracy.varied import Varied  # takes long to import
-
             start = what.of(projects.surface_of(project))
             for name in margin:
                 Varied.of(start, name)
@@ -208,9 +187,9 @@ def remesh_(
       pcmc remesh roof.pcmc --edge-length 0.25 -o fine.pcmc
     """
     stage = projects.Remeshing(edge_length, near_curves, chord=chord, when="before")
-    written = output_of(file, files=output)
+    written = arguments.output_of(file, files=output)
     with working() as progress:
-        project = load_project(file, units)
+        project = arguments.load_project(file, units)
         project = replace(project, output=replace(written, whole=project.output.whole))
         if solve:
             check = bool(project.mesh_check)
@@ -273,11 +252,6 @@ def sweep(
       pcmc sweep roof.toml corner.tension=6,6.2 "wall 1.tension=1,2" --csv roof.csv
       pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
-    from ..certificate.quantities import dimension_of
-    from ..sweep import draw_sweep, run, short_table, write_table
-    from ..sweep.projects import column_labels
-    from ..sweep.store import FAILED
-    from ..sweep.tables import TABLES, columns_of
 
     inputs = files_of(what) if Path(what).exists() else ()
     check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)
@@ -290,63 +264,49 @@ def sweep(
         raise OptionError("--retry-failed: is of stored cases; name their --store", what="--retry-failed")
     for name in show or ():
         dimension_of(name.rpartition(".")[2])  # refuses what is no quantity
-    options = {"mesh_check": mesh_check, "search": search}
 
     def resume(kept: int, missing: int) -> None:
         if kept:
             print(f"{store}: {kept} cases are finished, {missing} to run")
 
+    how: dict[str, Any] = {"scheduler": scheduler, "workers": workers, "time_limit": time_limit}
     with sweeping() as draw:
-        cases = _cases(what, values, method, options)
-        table = run(
-            cases,
-            store,
-            scheduler=scheduler,
-            workers=workers,
-            time_limit=time_limit,
-            retry_failed=retry_failed,
-            on_record=draw,
-            on_resume=resume,
-        )
+        cases = _cases(what, values, method, {"mesh_check": mesh_check, "search": search})
+        table = run(cases, store, retry_failed=retry_failed, on_record=draw, on_resume=resume, **how)
     if table.empty:
         return INTERRUPTED
-    first = short_table(table, list(cases.grid), show or ())
+    shown, grid = show or (), list(cases.grid)
+    first = short_table(table, grid, shown)
     if csv is not None:
         write_table(csv, table if every else first)
     labels = {} if ":" in what and not Path(what).exists() else column_labels(what, map(str, table))
     if plot is not None:
-        draw_sweep(table, list(cases.grid), plot, labels, *(show or ())[:1])
+        draw_sweep(table, grid, plot, labels, *shown[:1])
     print(first.rename(columns=labels).to_string(float_format=lambda x: f"{x:.5g}", na_rep=""))
-    for name in show or ():
-        if not columns_of(table, name, list(cases.grid)):
-            print(f"no case has {name}")
+    for name in (name for name in shown if not columns_of(table, name, grid)):
+        print(f"no case has {name}")
     failed = table[table["status"].isin(FAILED)]
     for message, alike in failed.groupby("message", sort=False):  # each reason once
         others = f" and {len(alike) - 1} more" if len(alike) > 1 else ""
         print(f"case {alike.index[0]}{others}: {alike['status'].iloc[0]}: {message}")
     if len(table) < len(cases):
         return INTERRUPTED
-    good = table["verdict"].isin(["stable", "neutral"])
-    for wish in ("targets_met", "accuracy_reached"):
-        good &= table.get(wish, True)
-    return OK if good.all() else NOT_CERTIFIED
+    good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
+    return OK if (good & table.get("accuracy_reached", True)).all() else NOT_CERTIFIED
 
 
 def _cases(what: str, values: list[str], method: str | None, options: dict[str, bool]) -> Sweep:
     """Every combination of the values, each NAME=V1,V2,...; a name with one value is the same in all."""
-    from ..sweep import Sweep, solve_case
-    from ..sweep.projects import project_sweep
-    from ..sweep.solving import digest_of
 
     given: dict[str, list[Any]] = {}
-    for name, listed in map(named_values, values):
+    for name, listed in map(arguments.named_values, values):
         if name in given:
             raise OptionError(f"{name} is given twice; list its values with commas: {name}=1,2", what=name)
         given[name] = listed
     grid = {name: listed for name, listed in given.items() if len(listed) > 1}
     grid = grid or given  # one case, whose names are checked as those of any other
     fixed = {name: listed[0] for name, listed in given.items() if name not in grid}
-    if Path(what).suffix.lower() in (TOML, DXF, *FORMATS, *READ_ONLY):
+    if Path(what).suffix.lower() in READ:
         return project_sweep(what, grid, fixed, method=method, **options)
     if ":" not in what:
         kinds = f"a project (.toml), a surface ({' '.join(FORMATS)}), or a generator"

@@ -9,13 +9,5 @@ from .settings import CuttingOptions
 from .sheets import pattern_drawings
 from .strips import CuttingPattern, Seam, Side, Strip
 
-__all__ = [
-    "CuttingPattern",
-    "CuttingOptions",
-    "Seam",
-    "Side",
-    "Strip",
-    "cutting_pattern",
-    "pattern_drawings",
-    "cutting_pattern_of",
-]
+__all__ = ["CuttingOptions", "CuttingPattern", "Seam", "Side", "Strip", "cutting_pattern"]
+__all__ += ["cutting_pattern_of", "pattern_drawings"]

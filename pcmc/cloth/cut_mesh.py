@@ -1,10 +1,12 @@
-"""The mesh of a roof cut along seams: geodesics get vertices where they cross edges."""
+"""The mesh of a roof cut along seams, which are geodesics: drawn lines, and strips across each sheet."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -17,32 +19,35 @@ from ..base.tolerances import ON
 from ..meshing.curve_cutting import cut_triangles, refined_round
 from ..meshing.quality import edge_lengths
 from ..surface import Surface
-from ..surface.geometry import angles, bounding_size, file_origin, lengths_along, segment_lengths
+from ..surface.geometry import (
+    angles,
+    area_vectors,
+    bounding_size,
+    file_origin,
+    lengths_along,
+    segment_lengths,
+)
+from ..surface.guides import Plane
 from ..surface.pieces import point_text
-from ..surface.topology import SIDES, Topology, components, edge_places, topology
+from ..surface.topology import SIDES, Topology, components, edge_places, joined, topology
 
 SNAP = 0.1  # of an edge: a seam that passes a vertex so near goes through it
 BESIDE = 0.3  # of an edge: such a seam crosses no other edge of that vertex so near to it
 MOST_TRIANGLES = 50_000  # beyond which triangles are not cut into four
+MEET = 0.25  # of a strip's width: ends of seams of two sheets so near to each other meet
+ANGLES = np.radians([0.0, 90.0, *range(1, 90), *range(91, 180)])  # in which the longer side is sought
+NARROWER = 0.98  # of the width square to x or y: another direction must do better
 
 
 @dataclass(frozen=True, eq=False)
 class CutMesh:
-    """The sheets of a roof, with the edges that are cut.
+    """The sheets of a roof, with the edges that are cut."""
 
-    Attributes
-    ----------
-    X, F : (n,3) vertices and (m,3) triangles.
-    source : (m,) the face of the surface that each triangle is a part of.
-    cuts : (c,2) edges along which the cloth is cut, each row ascending.
-    seam : (c,) the number of the seam on each, -1 for the curves of the roof.
-    """
-
-    X: Floats
-    F: Ints
-    source: Ints
-    cuts: Ints
-    seam: Ints
+    X: Floats  # (n,3)
+    F: Ints  # (m,3)
+    source: Ints  # (m,) the face of the surface that each triangle is a part of
+    cuts: Ints  # (c,2) edges along which the cloth is cut, each row ascending
+    seam: Ints  # (c,) the number of the seam on each, -1 for the curves of the roof
 
     @cached_property
     def topology(self) -> Topology:
@@ -65,18 +70,14 @@ class CutMesh:
     def pieces(self) -> Pieces:
         """The pieces that it falls into, each with vertices of its own."""
         topo = self.topology
-        uncut = ~self.cut_edge[topo.edge_of_face.ravel()[topo.neighbours[:, 0]]]
-        one, other = topo.neighbours[uncut].T
-        start, end = (3 * (one // 3) + (one % 3 + step) % 3 for step in (1, 2))  # corners at its ends
-        # both triangles have the same outside, so the neighbour runs along the edge the other way
-        end_too, start_too = (3 * (other // 3) + (other % 3 + step) % 3 for step in (1, 2))
-        pairs = np.stack([np.append(start, end), np.append(start_too, end_too)], axis=1)
-        corner = self.F.ravel()
-        label = components(pairs, 3 * len(self.F))
+        sides = topo.neighbours[~self.cut_edge[topo.edge_of_face.ravel()[topo.neighbours[:, 0]]]]
+        # the corners there of both triangles, of which the second runs the other way
+        ends = 3 * (sides // 3)[:, None] + (sides[:, None] + np.array([[1], [2]])) % 3
+        ends[..., 1] = ends[:, ::-1, 1]
+        label = components(ends.reshape(-1, 2), 3 * len(self.F))
         vertex = np.empty(label.max() + 1, dtype=np.int64)
-        vertex[label] = corner
-        piece = components(np.stack([one // 3, other // 3], 1), len(self.F))
-        return Pieces(label.reshape(-1, 3), vertex, piece)
+        vertex[label] = self.F.ravel()
+        return Pieces(label.reshape(-1, 3), vertex, components(sides // 3, len(self.F)))
 
     def with_points(self, ends: Ints, points: Floats) -> CutMesh:
         """The mesh with vertices at points (k,3) on different edges (k,2)."""
@@ -86,24 +87,20 @@ class CutMesh:
         # largest: two points of a seam and a corner may lie on a line
         place = edge_places(self.F[:, SIDES], ends)
         two = np.flatnonzero((place >= 0).sum(axis=1) == 2)
-        cut = place[two] >= 0
-        turn = np.where(cut[:, 0] & cut[:, 2], 2, cut.argmax(axis=1))
+        turn = ((place[two] < 0).argmax(axis=1) + 1) % 3  # after the side that is not cut
         roll = (np.arange(3) + turn[:, None]) % 3
         a, b, _ = np.take_along_axis(self.F[two], roll, axis=1).T
         p, q, _ = number[np.take_along_axis(place[two], roll, axis=1)].T
-        from_a, from_b = (
-            np.minimum(*(angles(X[np.stack(corners, axis=1)]).min(axis=1) for corners in pair))
-            for pair in (((q, a, p), (a, b, p)), ((q, a, b), (q, b, p)))
-        )
+        pairs = np.array([[(q, a, p), (a, b, p)], [(q, a, b), (q, b, p)]]).swapaxes(2, 3)
+        from_a, from_b = angles(X[pairs]).min(axis=(1, 3))
         first = np.zeros(len(self.F), dtype=np.int64)
         first[two] = np.where(from_b > from_a, (turn + 1) % 3, turn)
         F, source = cut_triangles(self.F, self.source, ends, number, first)
         split = edge_places(self.cuts, ends)
         halved = split >= 0
         halves = [np.stack([self.cuts[halved, side], number[split[halved]]], axis=1) for side in (0, 1)]
-        cuts = np.concatenate([self.cuts[~halved], *halves])
-        seam = np.concatenate([self.seam[~halved], self.seam[halved], self.seam[halved]])
-        return CutMesh(X, F, source, cuts, seam)
+        cuts, seam = np.concatenate([self.cuts[~halved], *halves]), self.seam
+        return CutMesh(X, F, source, cuts, np.concatenate([seam[~halved], seam[halved], seam[halved]]))
 
     def with_vertex(self, point: Floats, faces: Bools) -> tuple[CutMesh, int]:
         """The mesh with a vertex nearest to a point (3,) on chosen faces (m,), and its number."""
@@ -126,7 +123,6 @@ class CutMesh:
 
     def with_seam(self, start: int, end: int, number: int, name: str, faces: Bools) -> CutMesh:
         """The mesh cut along a geodesic between two vertices of one piece; OptionError if there is none.
-
         Where several pieces have both vertices it is one of those with ``faces`` (m,), if there is any."""
         if start == end:
             return self
@@ -148,21 +144,18 @@ class CutMesh:
                 path = np.asarray(solver.find_geodesic_path(*ends)) + origin
                 found.append((float(lengths_along(path)[-1]), path, piece))
         _, path, piece = min(found, key=lambda one: one[0])
-        sides = self.topology.edges_of(self.pieces.piece == piece)
-        edges = self.topology.edges[sides]
-        middle, length = self.X[edges].mean(axis=1), segment_lengths(self.X, edges)
-        near = cKDTree(path).query(middle)[0] <= 0.5 * length + ON * self.size
+        edges = self.topology.edges[self.topology.edges_of(self.pieces.piece == piece)]
+        reach = 0.5 * segment_lengths(self.X, edges) + ON * self.size
+        edges = edges[cKDTree(path).query(self.X[edges].mean(axis=1))[0] <= reach]
         place, share = np.empty((len(path), 2), dtype=np.int64), np.empty(len(path))
         for k, point in enumerate(path):
-            weights, away = nearest_places(self.X[edges[near][:, [0, 1, 1]]], point)
-            place[k], share[k] = edges[near][away.argmin()], 1.0 - weights[away.argmin(), 0]
+            weights, away = nearest_places(self.X[edges[:, [0, 1, 1]]], point)
+            place[k], share[k] = edges[away.argmin()], 1.0 - weights[away.argmin(), 0]
         return self._along(place, share, path, number, name)
 
     def _along(self, place: Ints, share: Floats, path: Floats, number: int, name: str) -> CutMesh:
-        """The mesh with the points of a path as vertices, and the edges between them cut.
-
-        An inner vertex that the path passes closely is moved onto it, which spares triangles without width.
-        """
+        """The mesh with the points of a path as vertices, and the edges between them cut. An inner vertex
+        that the path passes closely is moved onto it, which spares triangles without width."""
         X, fixed = self.X.copy(), self.topology.edges[self.cut_edge]
         nearest = np.where(share > 0.5, place[:, 1], place[:, 0])
         gap = np.minimum(share, 1.0 - share)
@@ -189,8 +182,7 @@ class CutMesh:
         return replace(mesh, cuts=cuts, seam=np.append(mesh.seam, np.full(len(pairs), number)))
 
 
-@dataclass(frozen=True, eq=False)
-class Pieces:
+class Pieces(NamedTuple):
     """The pieces of a cut mesh: vertices on a cut are there once for each piece beside it."""
 
     faces: Ints  # (m,3) the triangles of the mesh, of vertices of pieces
@@ -250,3 +242,116 @@ def nearest_places(P: Floats, point: Floats) -> tuple[Floats, Floats]:
     away[3, tries[3].min(axis=1) < 0.0] = np.inf
     best, every = away.argmin(axis=0), np.arange(len(P))
     return tries[best, every], away[best, every]
+
+
+@dataclass(frozen=True, eq=False)
+class ClothSheet:
+    """A sheet between curves and cables, cut into strips at equal steps of their width."""
+
+    patch: str
+    source: Bools  # (m,) its faces of the surface
+    along: Floats  # (3,) unit vector of the warp
+    across: Floats  # (3,) unit vector; the seams lie near to levels of x · across
+    levels: Floats  # (k,) ascending, with both ends: k - 1 strips, seams between
+
+
+def sheet_axes(P: Floats, plane: Plane, degrees: float | None) -> tuple[Floats, Floats]:
+    """Unit vectors (3,) along and across the strips of triangles P (m,3,3), square to their mean normal.
+    Along is the direction with this angle from x in the plan; by default the one across which the sheet is
+    narrowest."""
+    normal, (east, north, _) = area_vectors(P).sum(axis=0), plane.axes
+    normal = normal / (np.linalg.norm(normal) or 1.0)
+    if degrees is None:
+        first = east if np.linalg.norm(np.cross(east, normal)) > 0.1 else north
+        first = first - (first @ normal) * normal
+        first /= np.linalg.norm(first)
+        second = np.cross(normal, first)
+        turned = np.cos(ANGLES)[:, None] * second - np.sin(ANGLES)[:, None] * first
+        widths = np.ptp(P.reshape(-1, 3) @ turned.T, axis=0)
+        widths[:2] *= NARROWER ** np.array([2, 1])
+        across = turned[widths.argmin()]
+    else:
+        across = np.cross(normal, np.cos(np.radians(degrees)) * east + np.sin(np.radians(degrees)) * north)
+        if np.linalg.norm(across) < 1e-6:
+            text = f"direction: {degrees:g} degrees is square to a sheet of the roof; give another"
+            raise OptionError(text, what="direction", found=degrees)
+        across /= np.linalg.norm(across)
+    return np.cross(across, normal), across
+
+
+def level_ends(mesh: CutMesh, faces: Bools, height: Floats, level: float) -> Iterator[tuple[Floats, Floats]]:
+    """The ends (3,) of each line on which height (n,) has a level on chosen faces (m,), between two cuts."""
+    topo = mesh.topology
+    sides, above = topo.edge_of_face[faces], (height >= level)[topo.edges]
+    hit = (above[:, 0] != above[:, 1])[sides]
+    links = sides[hit].reshape(-1, 2).astype(np.int64)  # two sides of each triangle, or none
+    nodes = np.where(mesh.cut_edge[links], len(topo.edges) + np.arange(links.size).reshape(-1, 2), links)
+    names, at, local = np.unique(nodes, return_index=True, return_inverse=True)
+    for chain, closed, _ in joined(local.reshape(-1, 2), np.zeros(len(names), dtype=bool), len(names)):
+        if not closed:
+            a, b = topo.edges[links.ravel()[at[chain[[0, -1]]]]].T
+            share = (level - height[a]) / (height[b] - height[a])
+            start, end = mesh.X[a] + share[:, None] * (mesh.X[b] - mesh.X[a])
+            yield start, end
+
+
+def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet]) -> CutMesh:
+    """The mesh cut along geodesics between the ends of each sheet's levels; ends of several sheets meet."""
+    number, before = int(mesh.seam.max(initial=-1)) + 1, list[int]()  # the vertices at ends of other sheets
+    for sheet in sheets:
+        meet, height = MEET * float(np.diff(sheet.levels).min()), mesh.X @ sheet.across
+        own = [level_ends(mesh, sheet.source[mesh.source], height, level) for level in sheet.levels[1:-1]]
+        met = list[int]()
+        for line in [line for lines in own for line in lines]:  # a geodesic may cross the next level
+            for point in line:
+                mine = sheet.source[mesh.source]
+                others = np.intersect1d(before, mesh.F[mine]).astype(np.int64)
+                away = np.linalg.norm(mesh.X[others] - point, axis=1)
+                if away.min(initial=np.inf) <= meet:
+                    met.append(int(others[away.argmin()]))
+                else:
+                    mesh, vertex = mesh.with_vertex(point, mine)
+                    met.append(vertex)
+            mine = sheet.source[mesh.source]
+            mesh = mesh.with_seam(met[-2], met[-1], number, f"a seam of {sheet.patch!r}", mine)
+            number += 1
+        before += met
+    return mesh
+
+
+def with_lines(mesh: CutMesh, lines: Sequence[Floats], plane: Plane) -> CutMesh:
+    """The mesh cut along lines, each of points (k,2) in the plan or (k,3), joined by geodesics. An end within
+    an edge's length of a cut or a rim is put there. Of two sheets, one over the other, points of the plan are
+    on the upper one. OptionError for a point off the roof."""
+    first = int(mesh.seam.max(initial=-1)) + 1
+    for number, line in enumerate(lines):
+        name, previous = f"seam {number + 1}", -1
+        for k, point in enumerate(line):
+            weights, f, away = _seen(mesh, point, plane)
+            reach = float(segment_lengths(mesh.X, mesh.topology.edges[mesh.topology.edge_of_face[f]]).max())
+            if away > reach:
+                text = f"{name}: its point {point_text(point)} is off the roof, {away:.3g} from it; move it"
+                raise OptionError(text, what="seams", found=point.tolist())
+            place = weights @ mesh.X[mesh.F[f]]
+            if k in (0, len(line) - 1):
+                rim = mesh.X[mesh.topology.edges[mesh.cut_edge][:, [0, 1, 1]]]
+                on_rim, gap = nearest_places(rim, place)
+                if gap.min() <= reach:
+                    place = on_rim[gap.argmin()] @ rim[gap.argmin()]
+            mesh, vertex = mesh.with_vertex(place, np.ones(len(mesh.F), dtype=bool))
+            if k:
+                middle = _seen(mesh, 0.5 * (point + line[k - 1]), plane)[1]
+                faces = mesh.pieces.piece == mesh.pieces.piece[middle]
+                mesh = mesh.with_seam(previous, vertex, first + number, name, faces)
+            previous = vertex
+    return mesh
+
+
+def _seen(mesh: CutMesh, point: Floats, plane: Plane) -> tuple[Floats, int, float]:
+    """(3,) the barycentric coordinates of the place nearest to a point of the plan or of space, its triangle,
+    the highest of several, and how far it is."""
+    seen = mesh.X if len(point) == 3 else plane.to_local(mesh.X)[:, :2]
+    weights, away = nearest_places(seen[mesh.F], point)
+    height = (weights * plane.height(mesh.X)[mesh.F]).sum(axis=1)
+    f = int(np.where(away <= away.min() + ON * mesh.size, height, -np.inf).argmax())
+    return weights[f], f, float(away[f])

@@ -10,18 +10,15 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import OptionError, SurfaceError
-from ..base.libraries import load_library
 from ..certificate import Certificate
 from ..certificate.certificate import certified
 from ..surface import Surface, expect_surface
 from ..surface.geometry import face_areas, lengths_along
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
-from .cut_mesh import CutMesh, cut_mesh
-from .flattening import FOLDED
-from .layout import ClothSheet, sheet_axes, with_levels, with_lines
+from .cut_mesh import ClothSheet, CutMesh, cut_mesh, sheet_axes, with_levels, with_lines
 from .settings import CuttingOptions
-from .sewing import Cloth, seams_of
+from .sewing import FOLDED, Cloth, seams_of
 from .strips import CuttingPattern, Strip
 
 ACROSS = 4  # edges across the narrowest strip, about
@@ -50,7 +47,6 @@ def cutting_pattern(
 
     Parameters
     ----------
-    surface : a certified surface.
     width : of the cloth: no strip is wider, with its allowances.
     anyway : cut a surface that is not certified.
     certificate : of the surface, where it is known; by default it is computed.
@@ -85,17 +81,15 @@ def cutting_pattern_of(
     certificate = certified(surface, anyway, certificate)
     areas = face_areas(surface.vertices[surface.faces])
     area = surface.roof * np.bincount(surface.patch_of_face, areas, len(surface.patches))
-    widths = [] if options.net_width is None else [options.net_width]
     counts = [options.of_patch("strips", patch.name) or np.inf for patch in surface.patches]
-    widths += [float(width) for width in area**0.5 / counts if width > 0.0]
+    widths = [options.net_width or np.inf, *(width for width in area**0.5 / counts if width > 0.0)]
     if drawn := sum(float(lengths_along(line)[-1]) for line in options.lines):
         widths.append(float(area.sum()) / drawn)
-    base = with_lines(cut_mesh(surface, min(widths, default=np.inf) / ACROSS), options.lines, surface.plane)
+    base = with_lines(cut_mesh(surface, min(widths) / ACROSS), options.lines, surface.plane)
     if not len(base.F):
         text = "surface: it has no roof to be cut: every patch is a wall"
         raise SurfaceError(text, what="surface", found=0, expected="a patch that is no wall")
-    sheets = _sheets(surface, base, options)
-    widest: list[float] = []
+    sheets, widest = _sheets(surface, base, options), list[float]()
     for _ in range(ROUNDS):
         mesh = with_levels(base, sheets)
         piece = mesh.pieces.piece
@@ -105,13 +99,11 @@ def cutting_pattern_of(
             text = f"patch {name!r} is closed, without a rim: no seam starts anywhere;"
             raise SurfaceError(f"{text} draw seams that open it", what="surface", where=name)
         cloth = Cloth.of(surface, mesh, sheets, options)
-        points = cloth.laid_flat()
-        moved = _moved_levels(cloth, points, sheets, options, widest)
-        if moved is None:
+        points, before = cloth.laid_flat(), sheets
+        sheets = _moved_levels(cloth, points, sheets, options, widest)
+        if sheets == before:
             break
-        sheets = moved
-    strips = _strips(cloth, points, options)
-    return CuttingPattern(surface, certificate, options, strips, seams_of(cloth))
+    return CuttingPattern(surface, certificate, options, _strips(cloth, points, options), seams_of(cloth))
 
 
 def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> list[ClothSheet]:
@@ -139,18 +131,16 @@ def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> list[Cl
 
 def _moved_levels(
     cloth: Cloth, points: Floats, sheets: Sequence[ClothSheet], options: CuttingOptions, widest: list[float]
-) -> list[ClothSheet] | None:
-    """Sheets with levels between which strips are equally wide, more of them where they were too wide.
-
-    None where all fit: then the levels may stay as they are. OptionError for a strip that will not fit.
-    ``widest`` are the widths of the widest strips of the rounds before; that of this one is added.
-    """
+) -> list[ClothSheet]:
+    """Sheets with levels between which strips are equally wide, more of them where they were too wide; the
+    same where all fit. OptionError for a strip that will not fit. ``widest`` are the widths of the widest
+    strips of the rounds before; that of this one is added."""
     number, net = len(widest), options.net_width
     widths = np.array([np.ptp(points[cloth.strip_of_vertex == k, 1]) for k in range(len(cloth.sheet))])
     if net is None:
         widest.append(0.0)
         if number == 2:
-            return None
+            return list(sheets)
     else:
         wide = np.flatnonzero(widths > np.where(cloth.sheet < 0, net * (1.0 + ROUNDING), FILL * net))
         widest.append(float(widths[wide].max(initial=0.0)))
@@ -177,30 +167,25 @@ def _moved_levels(
                 continue
             count = max(count, int(np.ceil(found.sum() / (FILL * net)))) + int(number > 2)
         total = np.append(0.0, np.cumsum(found))
-        steps = np.linspace(0.0, total[-1], count + 1)
-        moved[k] = replace(sheet, levels=np.interp(steps, total, sheet.levels))
-    return None if moved == list(sheets) else moved
+        levels = np.interp(np.linspace(0.0, total[-1], count + 1), total, sheet.levels)
+        moved[k] = replace(sheet, levels=levels)
+    return moved
 
 
 def _strips(cloth: Cloth, points: Floats, options: CuttingOptions) -> list[Strip]:
     """The strips of a cloth laid flat, sewn; OptionError for one that no cloth follows."""
     stretches = list(map(options.stretch, cloth.tensions.tolist(), cloth.names))
-    flat, strain = cloth.sewn(points, stretches)
-    strips = []
+    (flat, strain), strips = cloth.sewn(points, stretches), list[Strip]()
     for k, name in enumerate(cloth.names):
         mine, used = cloth.strip_of_face == k, cloth.strip_of_vertex == k
         faces, source = cloth.local[cloth.mesh.pieces.faces[mine]], cloth.mesh.source[mine]
         laid = cloth.X[used], flat[used], stretches[k], strain[mine]
-        strip = Strip(k + 1, name, faces, source, *laid, cloth.outlines(k))
-        strips.append(strip)
-        outline, *holes = (strip.cut[loop] for loop in strip.outlines)
-        most, problem = float(np.abs(strip.strain).max()), ""
-        if most > 0.5 * FOLDED or not load_library("shapely", "cloth").Polygon(outline, holes).is_valid:
-            problem = "lies over itself"
-        elif most > MOST_STRAIN:
-            problem = f"stretches by {100.0 * most:.0f} %"
-        if problem:
-            text = f"strip {strip.number} of patch {name!r} {problem} where it is laid flat: no cloth"
+        strips.append(Strip(k + 1, name, faces, source, *laid, cloth.outlines(k)))
+        most = float(np.abs(strain[mine]).max())
+        over = most > 0.5 * FOLDED or not strips[-1].polygon.is_valid
+        if over or most > MOST_STRAIN:
+            problem = "lies over itself" if over else f"stretches by {100.0 * most:.0f} %"
+            text = f"strip {k + 1} of patch {name!r} {problem} where it is laid flat: no cloth"
             text += " follows it; make strips narrower, or draw a seam that opens it"
             raise OptionError(text, what="width")
     return strips

@@ -112,7 +112,7 @@ class CuttingOptions:
     @property
     def lines(self) -> list[Floats]:
         """The drawn seams as arrays (k,2) or (k,3)."""
-        lines = []
+        lines, expected = list[Floats](), "two or more points [x, y] or [x, y, z]"
         for number, line in enumerate(validate.sequence("seams", self.seams), 1):
             try:
                 points = np.asarray(line, dtype=float)
@@ -120,8 +120,7 @@ class CuttingOptions:
                 points = np.empty(0)
             good = points.ndim == 2 and len(points) > 1 and points.shape[1] in (2, 3)
             if not (good and np.isfinite(points).all()):
-                hint = "such as [[0, 0], [4, 2]]"
-                validate.refuse("seams", line, "two or more points [x, y] or [x, y, z]", str(number), hint)
+                validate.refuse("seams", line, expected, str(number), "such as [[0, 0], [4, 2]]")
             lines.append(points)
         return lines
 
@@ -158,7 +157,7 @@ class CuttingOptions:
         """
         if (stiffness := self.of_patch("stiffness", patch)) is not None:
             (warp, weft), poisson = stiffness, self.of_patch("poisson", patch)
-            strains = tension * (1.0 - poisson) / warp, tension * (1.0 / weft - poisson / warp)
-            return 1.0 / (1.0 + strains[0]), 1.0 / (1.0 + strains[1])
+            along, across = (1.0 - poisson) / warp, 1.0 / weft - poisson / warp
+            return 1.0 / (1.0 + tension * along), 1.0 / (1.0 + tension * across)
         warp, weft = self.compensation or (0.0, 0.0)
         return 1.0 - warp / 100.0, 1.0 - weft / 100.0

@@ -111,16 +111,15 @@ def seam_sheet(pattern: CuttingPattern, sheet: str, length: str) -> Sheet:
     lines = [curve._replace(points=seen(curve.points)[:, :2]) for curve in _curves(pattern)]
     texts = [(seen(at)[:2], str(strip.number), np.zeros(2)) for strip, at in _middles(pattern)]
     every = np.concatenate([line.points for line in lines])
-    ends = tuple(np.array([every[:, k].min(), every[:, k].max()]) for k in (0, 1))
-    view = DrawnView("roof", lines, texts, stations=(ends[0], ends[1]))
+    x, y = np.stack([every.min(axis=0), every.max(axis=0)], axis=1)
+    views = [DrawnView("roof", lines, texts, stations=(x, y))]
     decimals = length_decimals(length, pattern.surface.size)
-    return placed([view], title, sheet, length_factor(length, "mm"), None, decimals)
+    return placed(views, title, sheet, length_factor(length, "mm"), None, decimals)
 
 
 def _inside(strip: Strip) -> Floats:
     """(2,) a point in the middle of a cut strip."""
-    polygon = load_library("shapely", "cloth").Polygon(strip.cut[strip.outlines[0]])
-    return np.array(polygon.representative_point().coords[0])
+    return np.array(strip.polygon.representative_point().coords[0])
 
 
 def strip_lines(
@@ -129,41 +128,35 @@ def strip_lines(
     """What is drawn of a strip in its own coordinates, in the unit of the surface: the line to cut along, the
     seam lines, notches and the arrow of the warp; and the labels of its sides, seam and neighbour, at points
     (2,), with the unit vectors (2,) from there into the strip."""
-    options, added = pattern.options, dict[tuple[int, int], float]()
+    options, added, labels = pattern.options, dict[tuple[int, int], float](), []
     marks = [SheetLine(strip.cut[loop], "PCMC-SEAM", True) for loop in strip.outlines]
-    labels = []
     mean = float(np.mean([s.width for s in pattern.strips]))
     step = mean if options.notches is None else options.notches
-    for seam in pattern.seams:
+    for seam, side in [(m, side) for m in pattern.seams for side in m.sides if side.strip == strip.number]:
         beyond = options.rim_allowance if seam.kind == "rim" else options.allowance
-        for side in seam.sides:
-            if side.strip != strip.number:
-                continue
-            edges = side.edges if side.forward else side.edges[:, ::-1]
-            added |= dict.fromkeys(map(tuple, edges.tolist()), beyond)
-            count = int(seam.length / step) if seam.kind != "rim" and step > 0.0 else 0
-            if count > MOST_NOTCHES:
-                text = f"notches: marks at distances of {step:g} would be {count} on seam {seam.number}, more"
-                text += f" than {MOST_NOTCHES}; give a larger one"
-                raise OptionError(text, what="notches", found=step)
-            length = beyond or 0.02 * strip.width
-            for place in seam.length * np.arange(1, count + 1) / (count + 1):  # the same for all of its sides
-                at, inward = _along(seam, side, strip, place)
-                marks.append(SheetLine(np.array([at, at - length * inward]), "PCMC-NOTCH"))
-            at, inward = _along(seam, side, strip, 0.5 * seam.length)
-            others = "+".join(str(s.strip) for s in seam.sides if s is not side)
-            others = "image" if seam.kind == "mirror" else others
-            labels.append((at, f"S{seam.number}" + (f" / {others}" if others else ""), inward))
+        edges = side.edges if side.forward else side.edges[:, ::-1]
+        added |= dict.fromkeys(map(tuple, edges.tolist()), beyond)
+        count = int(seam.length / step) if seam.kind != "rim" and step > 0.0 else 0
+        if count > MOST_NOTCHES:
+            text = f"notches: marks at distances of {step:g} would be {count} on seam {seam.number}, more"
+            text += f" than {MOST_NOTCHES}; give a larger one"
+            raise OptionError(text, what="notches", found=step)
+        length = beyond or 0.02 * strip.width
+        for place in seam.length * np.arange(1, count + 1) / (count + 1):  # the same for all of its sides
+            at, inward = _along(seam, side, strip, place)
+            marks.append(SheetLine(np.array([at, at - length * inward]), "PCMC-NOTCH"))
+        at, inward = _along(seam, side, strip, 0.5 * seam.length)
+        others = "+".join(str(s.strip) for s in seam.sides if s is not side)
+        others = "image" if seam.kind == "mirror" else others
+        labels.append((at, f"S{seam.number}" + (f" / {others}" if others else ""), inward))
     cloth = _with_allowances(strip, added)
     shapes = [cloth.exterior, *cloth.interiors] if cloth.geom_type == "Polygon" else []
     cut = [SheetLine(np.array(ring.coords[:-1]), "PCMC-CUT", True) for ring in shapes]
     # the arrow along the warp, a tenth of the width below the strip's number
     middle, half = _inside(strip) - np.array([0.0, 0.1 * strip.width]), 0.5 * ARROW * strip.length
-    tail, tip = middle - np.array([half, 0.0]), middle + np.array([half, 0.0])
-    barb = 0.1 * min(half, strip.width)
-    head = np.array([tip - [barb, -0.5 * barb], tip, tip - [barb, 0.5 * barb]])
-    arrow = [SheetLine(np.array([tail, tip]), "PCMC-WARP"), SheetLine(head, "PCMC-WARP")]
-    return [*cut, *marks, *arrow], labels
+    barb, shaft = 0.1 * min(half, strip.width), middle + np.array([[-half, 0.0], [half, 0.0]])
+    head = shaft[1] - barb * np.array([[1.0, -0.5], [0.0, 0.0], [1.0, 0.5]])
+    return [*cut, *marks, SheetLine(shaft, "PCMC-WARP"), SheetLine(head, "PCMC-WARP")], labels
 
 
 def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> Any:
@@ -171,7 +164,7 @@ def _with_allowances(strip: Strip, added: Mapping[tuple[int, int], float]) -> An
     the lines outside meet, or cut across at ``MITRE`` of the larger allowance if that is farther. Along the
     weft it reaches no farther than the allowance from the widest place."""
     shapely = load_library("shapely", "cloth")
-    parts = [shapely.Polygon(strip.cut[strip.outlines[0]], [strip.cut[hole] for hole in strip.outlines[1:]])]
+    parts = [strip.polygon]
     for loop in strip.outlines:
         X, onward = strip.cut[loop], np.roll(strip.cut[loop], -1, axis=0)
         along = unit_vectors(onward - X)
@@ -203,8 +196,8 @@ def _along(seam: Seam, side: Side, strip: Strip, place: float) -> tuple[Floats, 
     total = lengths_along(seam.points)
     k = min(int(np.searchsorted(total, place, side="right")) - 1, len(total) - 2)
     a, b = strip.cut[side.edges[k]]
-    share, (x, y) = (place - total[k]) / (total[k + 1] - total[k]), (b - a) / np.linalg.norm(b - a)
-    return a + share * (b - a), np.array([-y, x]) if side.forward else np.array([y, -x])
+    (x, y), turn = (b - a) / np.linalg.norm(b - a), 1.0 if side.forward else -1.0
+    return a + (place - total[k]) / (total[k + 1] - total[k]) * (b - a), turn * np.array([-y, x])
 
 
 def _side_by_side(pattern: CuttingPattern, millimetres: float) -> Sheet:
@@ -212,10 +205,8 @@ def _side_by_side(pattern: CuttingPattern, millimetres: float) -> Sheet:
     sheet, top = Sheet("Strips", "A0", "1:1"), 0.0
     for strip in pattern.strips:
         lines, labels = strip_lines(pattern, strip)
-        every = millimetres * np.concatenate([line.points for line in lines])
-        low, high = every.min(axis=0), every.max(axis=0)
-        shift = np.array([-low[0], top - high[1]])
-        top -= high[1] - low[1] + GAP
+        x, y = millimetres * np.concatenate([line.points for line in lines]).T
+        shift, top = np.array([-x.min(), top - y.max()]), top - np.ptp(y) - GAP
         sheet.lines += [line._replace(points=millimetres * line.points + shift) for line in lines]
         height = min(LETTERS, 0.1 * millimetres * strip.width)
         about: Any = {"layer": "PCMC-LABEL", "align": "C"}

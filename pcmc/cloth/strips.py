@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from ..base.arrays import Floats, Ints, cached_array
+from ..base.libraries import load_library
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..certificate.tables import head_text
@@ -50,6 +51,12 @@ class Strip:
         """(v,2) as it is cut, without allowances: compensated, with x and y from 0."""
         cut = self.flat * np.array(self.stretch)
         return cut - cut.min(axis=0)
+
+    @cached_property
+    def polygon(self) -> Any:
+        """Its outline and holes, cut, as a polygon of shapely."""
+        outline, *holes = (self.cut[loop] for loop in self.outlines)
+        return load_library("shapely", "cloth").Polygon(outline, holes)
 
     @property
     def length(self) -> float:
@@ -136,9 +143,8 @@ class CuttingPattern:
         rows = []
         for s in self.strips:
             rms = np.sqrt((s.areas @ (s.strain**2).sum(axis=1)) / s.area)
-            strains = [100.0 * float(x) for x in (s.strain.min(), s.strain.max(), rms)]
-            shorter = [100.0 * (1.0 - factor) for factor in s.stretch]
-            rows.append([s.number, s.patch, s.length, s.width, s.area, s.cut_area, *strains, *shorter])
+            percents = 100.0 * np.array([s.strain.min(), s.strain.max(), rms, *np.subtract(1.0, s.stretch)])
+            rows.append([s.number, s.patch, s.length, s.width, s.area, s.cut_area, *percents.tolist()])
         head = ["strip", "patch", "length", "width", "area", "cut_area"]
         return pd.DataFrame(rows, columns=[*head, "strain_min", "strain_max", "strain_rms", "warp", "weft"])
 
@@ -150,22 +156,20 @@ class CuttingPattern:
         rows = []
         for seam in self.seams:
             cut = [self.side_lengths(side).sum() for side in seam.sides]
-            ends = [*seam.points[0].tolist(), *seam.points[-1].tolist()]
+            lengths = seam.length, float(np.mean(cut)), np.ptp(cut) / seam.length
             beside = " | ".join(str(side.strip) for side in seam.sides)
-            gap = (max(cut) - min(cut)) / seam.length
-            rows.append([seam.number, seam.kind, beside, seam.length, float(np.mean(cut)), gap, *ends])
+            rows.append([seam.number, seam.kind, beside, *lengths, *seam.points[[0, -1]].ravel().tolist()])
         head = ["seam", "kind", "strips", "length", "cut_length", "difference"]
         return pd.DataFrame(rows, columns=[*head, *(f"{c}{k}" for k in (0, 1) for c in "xyz")])
 
     @property
     def largest_difference(self) -> float:
         """Of the cut lengths of two sides of an edge of a seam, as a part of its length."""
-        worst = 0.0
+        worst = [0.0]
         for seam in self.seams:
-            lengths = np.array([self.side_lengths(side) for side in seam.sides])
-            on_roof = np.linalg.norm(np.diff(seam.points, axis=0), axis=1)
-            worst = max(worst, float((np.ptp(lengths, axis=0) / on_roof).max()))
-        return worst
+            apart = np.ptp([self.side_lengths(side) for side in seam.sides], axis=0)
+            worst.append(float((apart / np.linalg.norm(np.diff(seam.points, axis=0), axis=1)).max()))
+        return max(worst)
 
     def side_lengths(self, side: Side) -> Floats:
         """(k,) the cut lengths of the edges of a seam's side."""
@@ -178,14 +182,14 @@ class CuttingPattern:
         """Totals and the table of strips, with the units of the numbers if they are given."""
         table, seams = self.table, self.seam_table
         sewn = seams[seams["kind"] != "rim"]
-        long, wide = table["length"].max(), table["width"].max()
-        rows = {"strips": f"{len(table)}, up to {long:.5g} long and {wide:.5g} wide"}
-        rows["area"] = f"{table['area'].sum():.6g} on the roof, {table['cut_area'].sum():.6g} cut"
-        rows["strain"] = f"{table['strain_min'].min():.2g} to {table['strain_max'].max():.2g} %"
+        low, high, total = table.min(), table.max(), table.sum()
+        rows = {"strips": f"{len(table)}, up to {high['length']:.5g} long and {high['width']:.5g} wide"}
+        rows["area"] = f"{total['area']:.6g} on the roof, {total['cut_area']:.6g} cut"
+        rows["strain"] = f"{low['strain_min']:.2g} to {high['strain_max']:.2g} %"
         apart = f"their sides differ by at most {self.largest_difference:.1g} of the length"
         rows["seams"] = f"{len(sewn)}, {sewn['length'].sum():.5g} long; {apart}"
         if table[["warp", "weft"]].to_numpy().any():
-            warp, weft = (f"{table[way].min():.3g} to {table[way].max():.3g} %" for way in ("warp", "weft"))
+            warp, weft = (f"{low[way]:.3g} to {high[way]:.3g} %" for way in ("warp", "weft"))
             rows["cut shorter"] = f"by {warp} along the warp, {weft} along the weft"
         head = head_text(self.certificate, units, rows)
         return f"{head}\n\n{table.to_string(index=False, float_format=lambda x: f'{x:.4g}')}"

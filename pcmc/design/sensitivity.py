@@ -161,8 +161,8 @@ def _responses(at: Equilibrium, rates: Sequence[dict[str, Floats]]) -> list[tupl
         right = np.append(-space.to_coordinates(by_rates(surface, of)[1]), units * of.get("volumes", 0.0))
         if not np.any(right):
             return np.zeros_like(at.X), np.zeros(len(units))
-        z, residuals = solve_preconditioned(times, inverse.solve, right, ACCURACY, restart=40)
-        unit = np.linalg.norm(inverse.solve(right)) / np.linalg.norm(right)  # that of the residuals
+        z, residuals = solve_preconditioned(times, inverse, right, ACCURACY, restart=40)
+        unit = np.linalg.norm(inverse(right)) / np.linalg.norm(right)  # that of the residuals
         if not residuals or residuals[-1] > NO_SOLUTION * unit:
             raise SurfaceError(AT_FOLD, what="surface")
         return motion(z[:count]), units * z[count:]

@@ -23,7 +23,7 @@ SHORT = {"reaction": "reaction per length"}  # names that stand for others
 
 def _margin(surface: Surface, of: str | None) -> Measurement:
     """The factor of ``pcmc.margin``."""
-    from ..accuracy.margin_targets import measured_margin  # takes long to import
+    from ..accuracy.margins import measured_margin  # takes long to import
 
     return measured_margin(surface, of)
 

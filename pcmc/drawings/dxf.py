@@ -71,7 +71,8 @@ def layer_name(text: str) -> str:
 
 
 def _add_model(space: Any, model: Any) -> None:
-    surface, (low, high) = model.surface, (end(model.surface.vertices, axis=0) for end in (np.min, np.max))
+    surface = model.surface
+    low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
     for corners in surface.vertices[surface.faces[surface.roof[surface.patch_of_face]]].tolist():
         space.add_3dface(corners, dxfattribs={"layer": "PCMC-PANEL"})
     for line in (*model.curves, *model.sections):

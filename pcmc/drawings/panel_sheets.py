@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from itertools import count
 from string import ascii_lowercase
 from typing import NamedTuple
 
@@ -12,8 +13,8 @@ import pandas as pd
 
 from ..base.arrays import Floats
 from ..panelling import PanelNet, Panels
-from ..panelling.flat import packed, turned_to_fit
 from ..panelling.planar import laid_flat_polygons
+from ..panelling.schedule import packed, turned_to_fit
 from ..surface.geometry import cross_2d
 from .sheet import WIDTH, Sheet, SheetLine, Text, corner, drawing_area, table_sheets
 
@@ -78,11 +79,9 @@ def triangles_at_true_size(schedule: Panels, millimetres: float) -> list[FlatPan
         [f"{'+'.join(str(k) for k in at_edge[e] if k != number) or 'rim'} / e{e}" for e in edges]
         for number, edges in enumerate(sides, start=1)
     ]
-    rows = zip(schedule.flat * millimetres, labels, schedule.panels["family"], strict=True)
-    return [  # an edge of a triangle has the number of the corner opposite
-        FlatPanel(corners, k, f"F{family}", [text[2], text[0], text[1]])
-        for k, (corners, text, family) in enumerate(rows, start=1)
-    ]
+    rows = zip(schedule.flat * millimetres, count(1), schedule.panels["family"], labels, strict=False)
+    # an edge of a triangle has the number of the corner opposite
+    return [FlatPanel(corners, k, f"F{family}", [c, a, b]) for corners, k, family, (a, b, c) in rows]
 
 
 def polygons_at_true_size(net: PanelNet, millimetres: float) -> list[FlatPanel]:

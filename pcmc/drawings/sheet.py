@@ -230,7 +230,7 @@ def add_frames(sheets: list[Sheet], name: str, units: str, certificate: Certific
         width, height = sheet.size
         low, right, top = MARGIN, width - MARGIN, height - MARGIN
         frame = np.array([[low, low], [right, low], [right, top], [low, top]])
-        strip = np.array([[low, low + STRIP], [right, low + STRIP]])
+        strip = frame[:2] + np.array([0.0, STRIP])
         sheet.lines += [SheetLine(frame, "PCMC-FRAME", True), SheetLine(strip, "PCMC-FRAME")]
         upper, lower = low + 0.7 * STRIP, low + 0.28 * STRIP
         about = [name, certificate.part, f"scale {sheet.scale}" if sheet.scale else "", f"lengths in {units}"]

@@ -98,11 +98,9 @@ def cut_lines(
 ) -> list[SheetLine]:
     """The lines in which a plane cuts the roof and its walls, but for those ``without``."""
     layers = ["PCMC-SECTION" if roof else "PCMC-SECTION-WALL" for roof in surface.roof]
-    return [
-        SheetLine(one.points, layers[one.patch], one.closed, surface.patches[one.patch].name)
-        for one in section(surface, point, normal)
-        if surface.patches[one.patch].name not in without
-    ]
+    named = [(one, surface.patches[one.patch].name) for one in section(surface, point, normal)]
+    kept = [(one, name) for one, name in named if name not in without]
+    return [SheetLine(one.points, layers[one.patch], one.closed, name) for one, name in kept]
 
 
 def _seen(title: str, surface: Surface, curves: Lines, axes: Floats, faces: Bools) -> DrawnView:
@@ -206,10 +204,8 @@ def placed(
 
 def _add(sheet: Sheet, view: DrawnView, factor: float, shift: Floats) -> None:
     """Lines, marked points, and the names that find room: those of supports and cables first."""
-    sheet.lines += [
-        SheetLine(factor * line.points + shift, line.layer, line.closed)
-        for line in sorted(view.lines, key=lambda line: line.layer != "PCMC-PANEL")
-    ]
+    lines = sorted(view.lines, key=lambda line: line.layer != "PCMC-PANEL")
+    sheet.lines += [SheetLine(factor * line.points + shift, line.layer, line.closed) for line in lines]
     small, marks = list[Text](), list[Text]()
     large = [
         Text(factor * at + shift + direction * [0.5 * width(text) + 1.0, SMALL], text, align="C")

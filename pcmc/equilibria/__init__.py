@@ -9,13 +9,5 @@ from .free_cell import FreeCell, cell_stress, free_cell
 from .search import SearchOptions, find_equilibria
 from .shapes import shape_distance
 
-__all__ = [
-    "Equilibria",
-    "FoundEquilibrium",
-    "FreeCell",
-    "SearchOptions",
-    "cell_stress",
-    "find_equilibria",
-    "free_cell",
-    "shape_distance",
-]
+__all__ = ["Equilibria", "FoundEquilibrium", "FreeCell", "SearchOptions", "cell_stress", "find_equilibria"]
+__all__ += ["free_cell", "shape_distance"]

@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from ..accuracy.varied import Varied
-from ..base.errors import NoBranch, OptionError
+from ..base import validate
+from ..base.errors import NoBranch
 from ..base.tolerances import HOMOTOPY_END
 from ..solvers.continuation import BoundaryMotion, Branch, Direction, Ending, follow
 from ..solvers.result import Progress
@@ -45,13 +46,12 @@ class TracedParameter:
             name = "boundary"
         elif not isinstance(what, Direction):
             expected = "a name such as 'pressure' or 'tension of roof', a Direction or a BoundaryMotion"
-            raise OptionError(f"along: expected {expected}, found {what!r}", what="along", found=what)
+            validate.refuse("along", what, expected)
         value = parameter.line(surface).value
         reach = AROUND * abs(value) or FROM_ZERO
         low, high = span or (value - reach, value + reach)
         if not low < value < high:
-            text = f"span: expected numbers below and above the present value {value:g}, found {(low, high)}"
-            raise OptionError(text, what="span", found=(low, high), expected=value)
+            validate.refuse("span", (low, high), f"numbers below and above the present value {value:g}")
         return cls(name, parameter, value, (low, high))
 
     def trace(self, surface: Surface, watch: Callable[[Progress], None]) -> Branch | None:
@@ -80,8 +80,15 @@ class TracedParameter:
 
     def leaving(self, branch: Branch, row: int, watch: Callable[[Progress], None]) -> list[Branch]:
         """The two branches that leave one at a bifurcation, from there on; OptionError if none is found."""
-        two = branch.switch(row, steps=STEPS, callback=self._within(watch))
-        return [_from_event(self._ended(one), branch, row) for one in two]
+        event, found = branch.events.loc[row], []
+        for one in map(self._ended, branch.switch(row, steps=STEPS, callback=self._within(watch))):
+            points = one.points
+            known = {name: event[name] for name in points.columns.intersection(event.index)}
+            at_event = points.iloc[0].to_dict() | known | {"arclength": -FIRST, "slope": 0.0}
+            surfaces = {0: branch.event_surfaces[row]} | {k + 1: s for k, s in one.surfaces.items()}
+            points = pd.concat([pd.DataFrame([at_event]), points], ignore_index=True)
+            found.append(replace(one, points=points, surfaces=surfaces))
+        return found
 
     def _ended(self, branch: Branch) -> Branch:
         """A branch that ended by itself; KeyboardInterrupt where it was stopped."""
@@ -128,18 +135,6 @@ class TracedParameter:
                 return way.last
             reason = way.message
         return reason
-
-
-def _from_event(branch: Branch, other: Branch, row: int) -> Branch:
-    """A branch that leaves another at an event, with the event as its first point."""
-    event, first = other.events.loc[row], branch.points.iloc[0]
-    there = first.to_dict() | {name: event[name] for name in branch.points.columns.intersection(event.index)}
-    there |= {"arclength": -FIRST, "slope": 0.0}
-    return replace(
-        branch,
-        points=pd.concat([pd.DataFrame([there]), branch.points], ignore_index=True),
-        surfaces={0: other.event_surfaces[row]} | {k + 1: one for k, one in branch.surfaces.items()},
-    )
 
 
 def join_branches(back: Branch, forth: Branch) -> Branch:

@@ -157,8 +157,7 @@ class Equilibria:
             ways = (b.energy for b in self.barriers if b.start == start and b.to != start)
             return min(ways, default=math.inf)
         validate.choice("to", str(to), [str(k) for k in self.stable])
-        reached: set[int | None]
-        reached, top = {start}, -math.inf
+        reached, top = set[int | None]({start}), -math.inf
         while to not in reached:
             steps = [(self[b.saddle].energy, b.to) for b in self.barriers if b.start in reached and b.to]
             steps = [step for step in steps if step[1] not in reached]
@@ -173,17 +172,14 @@ class Equilibria:
         shown = self.table.drop(columns=["mesh"] * (not any(one.mesh_check for one in self.found)))
         numbers = shown.select_dtypes(float).columns
         table = shown.assign(**{name: shown[name].map("{:.6g}".format) for name in numbers})
-        lines = [
-            units.sentence if units else "",
-            table.rename(columns=lambda name: name.replace("_", " ")).to_string(index=False),
-        ]
+        rows = table.rename(columns=lambda name: name.replace("_", " ")).to_string(index=False)
         half = ", ".join(self.found[0].certificate.symmetric_in) if self.found else ""
         if half:
             half = f"All this is of a part of the roof; shapes that are not symmetric in {half} were left out"
             half += " (--whole, or the surface that pcmc.mirrored unfolds, has them)."
         given = "The search was stopped before its end." if self.stopped else ""
-        ways = self.barrier_lines(units)
-        return "\n".join(filter(None, [*lines, *ways, *self.searched, *self.failed, given, half, INCOMPLETE]))
+        words = [*self.barrier_lines(units), *self.searched, *self.failed, given, half, INCOMPLETE]
+        return "\n".join(filter(None, [units.sentence if units else "", rows, *words]))
 
     def barrier_lines(self, units: Units = NO_UNITS) -> list[str]:
         """A line for each barrier: from where, over which saddle, to where, its energy; last the unknown."""
@@ -197,9 +193,8 @@ class Equilibria:
             group = next((group for group in joined if self.barrier(group[0], k) < math.inf), None)
             joined.append([k]) if group is None else group.append(k)
         for group in joined[1:]:
-            others = ", ".join(map(str, group))
-            text = f"barrier from {joined[0][0]} to {others}: not known, as no saddle was found between them"
-            lines.append(text)
+            ends = f"from {joined[0][0]} to {', '.join(map(str, group))}"
+            lines.append(f"barrier {ends}: not known, as no saddle was found between them")
         return lines
 
     def __repr__(self) -> str:

@@ -131,7 +131,7 @@ def free_cell(
     first = _volume(at)
     for _ in range(STEPS):
         g = left(at)
-        probes = [left(_at_rest(_stretched(at, expm(PROBE * each)))[0]) for each in basis]
+        probes = [left(_at_rest(at, expm(PROBE * each))[0]) for each in basis]
         slope = (np.stack(probes, axis=1) - g[:, None]) / PROBE
         solves += len(basis)
         if np.linalg.norm(g) <= tolerance:
@@ -144,7 +144,7 @@ def free_cell(
             further = expm(np.tensordot(step, basis, axes=1))
             solves += 1
             with suppress(SurfaceError):
-                following = _at_rest(_stretched(at, further))
+                following = _at_rest(at, further)
                 if np.linalg.norm(left(following[0])) < np.linalg.norm(g):
                     (at, certificate), stretch = following, stretch @ further
                     break
@@ -168,9 +168,8 @@ def _strains(free: str, volume_kept: bool) -> Floats:
     if free != "size":
         basis += [(x - y) / root, (x + y - 2.0 * z) / np.sqrt(6.0)]
     if free == "shape":
-        for i, j in ((0, 1), (1, 2), (2, 0)):
-            basis.append(np.zeros((3, 3)))
-            basis[-1][[i, j], [j, i]] = 1.0 / root
+        e = np.eye(3)
+        basis += [(np.outer(e[i], e[j]) + np.outer(e[j], e[i])) / root for i, j in ((0, 1), (1, 2), (2, 0))]
     if not basis:
         text = "free_cell: a cell of one size and one volume has nothing free; give pressure=, or"
         raise OptionError(f"{text} free='lengths'", what="free", found=free, expected="lengths")
@@ -181,11 +180,10 @@ def _volume(surface: Surface) -> float:
     return abs(float(np.linalg.det(lattice_of(surface))))
 
 
-def _stretched(surface: Surface, stretch: Floats) -> Surface:
-    return surface.rebuilt(vertices=surface.vertices @ stretch)
-
-
-def _at_rest(surface: Surface) -> tuple[Surface, Certificate]:
+def _at_rest(surface: Surface, stretch: Floats | None = None) -> tuple[Surface, Certificate]:
+    """The surface at rest, in the cell stretched by a matrix if one is given; and its certificate."""
+    if stretch is not None:
+        surface = surface.rebuilt(vertices=surface.vertices @ stretch)
     result = solve(surface, target="stationary")
     if not result.converged:
         where = lattice_of(surface).round(6).tolist()

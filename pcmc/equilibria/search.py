@@ -22,18 +22,14 @@ from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
 from .branches import Span, TracedParameter
-from .deflation import deflated_newton
 from .found import Equilibria, FoundEquilibrium, WayDown
+from .from_known import deflated_newton, pass_between, way_down, with_good_triangles
 from .shapes import Shape
-from .ways_down import pass_between, way_down, with_good_triangles
 
 MODES = 8  # of the lowest modes a start is displaced along
 FAR = (0.05, 0.3)  # of the size: how far a start is displaced
-ENDS = {
-    Status.DIVERGED: "inflates without bound",
-    Status.VANISHED: "shrinks to nothing",
-    Status.DEGENERATE: "pinches off or collapses",
-}
+ENDS = {Status.DIVERGED: "inflates without bound", Status.VANISHED: "shrinks to nothing"}
+ENDS |= {Status.DEGENERATE: "pinches off or collapses"}
 
 Along = str | Direction | BoundaryMotion
 
@@ -137,9 +133,8 @@ def find_equilibria(
     expect_flat(given, "find_equilibria")
     validate.callback("callback", callback, "a function of a sentence")
     chosen = validate.options_from(SearchOptions, "find_equilibria", options)
-    every = (
-        [along] if isinstance(along, str | Direction | BoundaryMotion) else validate.sequence("along", along)
-    )
+    single = isinstance(along, str | Direction | BoundaryMotion)
+    every = [along] if single else validate.sequence("along", along)
     lines = [TracedParameter.of(given, what, chosen.span) for what in every]
     search = _Search(given, lines, chosen, callback)
     try:
@@ -296,9 +291,8 @@ class _Search:
                 surface, status = way_down(one.surface, side)
                 if status is Status.STOPPED:
                     raise KeyboardInterrupt
-                to = None
-                if status is Status.CONVERGED:
-                    to = self.add(with_good_triangles(surface), "on the way down from a saddle")
+                arrived, how = status is Status.CONVERGED, "on the way down from a saddle"
+                to = self.add(with_good_triangles(surface), how) if arrived else None
                 end = "" if to is not None else ENDS.get(status, f"no minimum ({status.name.lower()})")
                 ends.append(end)
                 if one.index == 1:
@@ -334,8 +328,7 @@ class _Search:
                 continue
             self.tried.add(pair)
             self.tell("looking for a pass between two minima")
-            result = pass_between(one, other)
-            if result is not None:
+            if (result := pass_between(one, other)) is not None:
                 self.add(result.surface, "between two minima")
 
     def result(self) -> Equilibria:
@@ -350,12 +343,6 @@ class _Search:
             for line, branches in every
         ]
         searched.append(f"Deflated Newton: {self.starts} starts, {self.arrived} came to rest.")
-        return Equilibria(
-            tuple(self.found[k] for k in order),
-            tuple(sorted(ways, key=lambda way: way.saddle)),
-            tuple(self.lines),
-            {line.name: tuple(branches) for line, branches in every},
-            tuple(searched),
-            tuple(dict.fromkeys(self.failed)),
-            self.stopped,
-        )
+        down, branches = sorted(ways, key=lambda way: way.saddle), {line.name: tuple(b) for line, b in every}
+        known = tuple(self.found[k] for k in order), tuple(down), tuple(self.lines), branches
+        return Equilibria(*known, tuple(searched), tuple(dict.fromkeys(self.failed)), self.stopped)

@@ -58,7 +58,7 @@ class Shape:
     def distance(self, other: Shape) -> float:
         """The root mean square distance of each surface's points from the other, by area, both ways."""
         pairs = ((self, other), (other, self))
-        squares = [one.area @ its.distances(one.X) ** 2 / one.area.sum() for one, its in pairs]
+        squares = [np.average(its.distances(one.X) ** 2, weights=one.area) for one, its in pairs]
         return float(np.sqrt(np.mean(squares)))
 
 

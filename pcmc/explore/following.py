@@ -30,10 +30,12 @@ FIRST_ATTEMPTS = 4  # of following, before the project's own walls are tried
 START_SECONDS = 6.0  # time limit of solving from the start shape
 Values = Mapping[str, Mapping[str, Any]]  # numbers by kind and name; and points, each [x, y, z]
 Stop = Callable[[], bool]
+Progressed = Callable[[str], None]  # is told each step
 
 
-def until(stop: Stop, end: float) -> Stop:
-    """True when ``stop`` is, or when the monotonic clock has passed ``end``."""
+def until(stop: Stop, seconds: float) -> Stop:
+    """True when ``stop`` is, or when so many seconds have passed."""
+    end = time.monotonic() + seconds
     return lambda: stop() or time.monotonic() > end
 
 
@@ -58,8 +60,7 @@ class Reached:
 
 def reach(start: Surface, asked: Surface, stop: Stop, attempts: int = 100, **options: Any) -> Reached:
     """Follow the equilibrium from ``start`` to the values of ``asked``; a step that fails is halved."""
-    here, certificate, done, step = start, None, 0.0, 1.0
-    failed = None
+    here, certificate, failed, done, step = start, None, None, 0.0, 1.0
     for _ in range(attempts):
         ahead = min(1.0, done + step)
         aim = between(start, asked, ahead).moved(_with_points(here, start, asked, ahead))
@@ -126,20 +127,14 @@ class ProjectFallback:
         return replace(self, given=self.given | _walls(surface))
 
     def settle(
-        self,
-        here: Surface,
-        asked: Surface,
-        stop: Stop,
-        end: float,
-        progress: Callable[[str], None],
-        **options: Any,
+        self, here: Surface, asked: Surface, stop: Stop, seconds: float, progress: Progressed, **options: Any
     ) -> tuple[Reached, str, ProjectFallback]:
         """Follow to ``asked``; else with the project's walls, in small steps, and from its start shape.
 
-        Following ends at the time ``end`` of the monotonic clock. Returns where it ended; a note, unless
-        following led there: what did, or why the project does not; and the fallback for the next time.
+        Following ends after these ``seconds``. Returns where it ended; a note, unless following led there:
+        what did, or why the project does not; and the fallback for the next time.
         """
-        late = until(stop, end)
+        late = until(stop, seconds)
         way = reach(here, asked, late, attempts=FIRST_ATTEMPTS if self.data else 100, **options)
         if way.failed is None or stop() or not self.data:
             return way, "", self
@@ -181,7 +176,7 @@ def _walls(surface: Surface) -> frozenset[tuple[str, float]]:
 
 def solved_start_shape(project: projects.Project, start: Surface, stop: Stop) -> Result | None:
     """A start shape solved and remeshed as its project asks for, without targets; None where that fails."""
-    stop = until(stop, time.monotonic() + START_SECONDS)
+    stop = until(stop, START_SECONDS)
 
     def check(_: str) -> None:
         if stop():

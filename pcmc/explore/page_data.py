@@ -18,7 +18,6 @@ from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate
 from ..certificate.forces import Forces
 from ..certificate.quantities import dimension_of
-from ..design import Parameter, Target
 from ..design.targets import MEASURES, NAMED
 from ..equilibria import Equilibria
 from ..equilibria.found import INCOMPLETE
@@ -42,8 +41,7 @@ def outline(surface: Surface, origin: Floats) -> tuple[dict[str, Any], Arrays]:
     these corners, ``sheet_vertex`` and ``sheet_patch`` are their vertex and patch.
     """
     piece, surface = surface, drawn(surface)
-    walls, colours = surface.walls.tolist(), patch_colors(surface).tolist()
-    patches = zip(surface.patches, walls, colours, strict=True)
+    patches = zip(surface.patches, surface.walls.tolist(), patch_colors(surface).tolist(), strict=True)
     header = {
         "patches": [{"name": p.name, "wall": wall, "color": colour} for p, wall, colour in patches],
         "controls": _controls(piece),
@@ -58,8 +56,8 @@ def outline(surface: Surface, origin: Floats) -> tuple[dict[str, Any], Arrays]:
         "mirrors": [[p.point, p.normal] for p, _ in piece.on_planes if p.mirror],
         "ground": float(surface.plane.height(origin)),
     }
-    corner = surface.patch_of_face[:, None].astype(np.int64) * surface.n + surface.faces
-    corners, faces = np.unique(corner, return_inverse=True)
+    keys = surface.patch_of_face[:, None].astype(np.int64) * surface.n + surface.faces
+    corners, faces = np.unique(keys, return_inverse=True)
     topo, curves = surface.topology, surface.topology.curve_edge.copy()
     curves[topo.edge_numbers(surface.cable_edges[0])] = True
     of_wall = np.ones(len(topo.edges), dtype=bool)  # edges all of whose triangles belong to walls
@@ -204,32 +202,23 @@ def target_choices(surface: Surface) -> list[dict[str, Any]]:
         varied.setdefault(parts, what)
     choices = []
     for quantity in MEASURES:
-        owner = NAMED.get(quantity, "wall" if quantity == "lean" else "patch")
-        if names[owner] and quantity != "height":
-            of = names[owner] if quantity in NAMED else ["", *names[owner]]
-            of = [*varied.values()] if quantity == "margin" else of
+        own = names[NAMED.get(quantity, "wall" if quantity == "lean" else "patch")]
+        if own and quantity != "height":
+            of = [*varied.values()] if quantity == "margin" else own if quantity in NAMED else ["", *own]
             choices.append({"quantity": quantity, "of": of, "dimension": dimension_of(quantity)})
     return choices
 
 
-def aims_data(targets: tuple[Target, ...], vary: tuple[Parameter, ...]) -> dict[str, Any]:
-    """Targets and parameters as plain data, for the page's form."""
-    return {
-        "targets": [{**vars(target), "label": target.label} for target in targets],
-        "vary": [{"label": parameter.label, "parameter": vars(parameter)} for parameter in vary],
-    }
-
-
 def equilibria_data(found: Equilibria, units: Units = NO_UNITS) -> dict[str, Any]:
     """The branches and equilibria of a search, each point with the number of its surface, and in words."""
-    numbers, branches = count(len(found)), []
-    (along,) = found.lines
+    (along,), numbers, branches = found.lines, count(len(found)), []
     for branch in found.branches[along.name]:
         shown = branch.points.loc[sorted(branch.surfaces)]
         columns = {name: shown[name].tolist() for name in ("parameter", "height", "index")}
         lines = branch.pieces("parameter", "height")
-        pieces = [{"stable": stable, "points": points.tolist()} for stable, points in lines]
-        branches.append(columns | {"number": [next(numbers) for _ in range(len(shown))], "pieces": pieces})
+        columns["number"] = [next(numbers) for _ in range(len(shown))]
+        columns["pieces"] = [{"stable": stable, "points": points.tolist()} for stable, points in lines]
+        branches.append(columns)
     rows = found.table[["height", "index", "energy"]].to_dict(orient="records")
     return {
         "parameter": along.name,

@@ -8,6 +8,7 @@ import re
 import threading
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -32,7 +33,9 @@ if TYPE_CHECKING:
 
 EVERY = 0.5  # seconds between two looks at the files
 Signature = tuple[tuple[str, tuple[int, ...]], ...]
-Aims = tuple[tuple[Target, ...], tuple[Parameter, ...]]  # targets, and what may vary for them
+Targets = tuple[Target, ...]
+Varied = tuple[Parameter, ...]  # what may vary for targets
+Aims = tuple[Targets, Varied]
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,12 +151,11 @@ def signature(path: Path) -> Signature:
     """What tells that a file, or one that it refers to, was saved, replaced, or can no longer be read."""
     states: list[tuple[str, tuple[int, ...]]] = []
     for file in files_of(path):
-        try:
+        seen: tuple[int, ...] = ()
+        with suppress(OSError, ValueError):  # missing, or no name of a file
             state, readable = file.stat(), os.access(file, os.R_OK)
             seen = (state.st_mtime_ns, state.st_size, state.st_mode, state.st_ino, readable)
-            states.append((str(file), seen))
-        except (OSError, ValueError):  # missing, or no name of a file
-            states.append((str(file), ()))
+        states.append((str(file), seen))
     return tuple(states)
 
 
@@ -213,23 +215,8 @@ def save(
     targets. FileError for a name that leads elsewhere, or a file that may not be replaced; OptionError for
     values that the project cannot hold; MissingExtra without tomlkit.
     """
-    project, path = _place(roof, name)
+    project, path = _place(roof, name, replace)
     text, note, left = project_with(roof, surface, aims, path.stem)
-    problem = ""
-    if not path.exists():
-        pass
-    elif not replace:
-        problem = "is there already; check that it may be replaced, or give another name"
-    elif path.resolve() == project.path.resolve():
-        if path.read_text(encoding="utf-8-sig") != project.text:
-            problem = "was changed since the page read it; save under another name"
-    else:
-        try:
-            read_data(path)
-        except FileError:
-            problem = "is no project of pcmc, so it is not replaced; give another name"
-    if problem:
-        raise FileError(f"{path.name} {problem}", what="name", found=path.name)
     with atomic_write(path) as temporary:
         ends = "\r\n" if project.path.exists() and b"\r\n" in project.path.read_bytes() else "\n"
         temporary.write_text(text, encoding="utf-8", newline=ends)
@@ -245,24 +232,35 @@ def save(
     return path, note
 
 
-def _place(roof: ShownRoof, name: str) -> tuple[Project, Path]:
-    """The roof's project, and the path of a file beside its; FileError for one that is elsewhere."""
-    if roof.project is None:
+def _place(roof: ShownRoof, name: str, replace: bool) -> tuple[Project, Path]:
+    """The roof's project, and the path of a file beside its; FileError for one that is elsewhere, or may not
+    be replaced."""
+    project, name, problem = roof.project, name.strip(), ""
+    if project is None:
         raise FileError("only a project or a drawing can be saved as a project; use Export", what="name")
-    name = name.strip() if name.strip().lower().endswith(".toml") else f"{name.strip()}.toml"
-    folder = roof.project.path.parent.resolve()
-    problem = ""
+    name = name if name.lower().endswith(".toml") else f"{name}.toml"
+    path, folder = project.path.parent / name, project.path.parent.resolve()
     if not re.fullmatch(r"[^/\\:*?\"<>|.][^/\\:*?\"<>|]*", name) or not name.isprintable():
         problem = "a name without folder is needed, such as variant.toml"
     elif len(name) > 100 or len(name.encode()) > 240:  # file systems have 255 bytes
         problem = "a shorter name is needed: at most 100 letters and 240 bytes, with .toml"
-    elif (folder / name).resolve().parent != folder:
+    elif path.resolve().parent != folder:
         problem = "this is a link to another folder; give another name"
-    elif (folder / name).exists() and not (folder / name).is_file():
+    elif path.exists() and not path.is_file():
         problem = "this is no file; give another name"
+    elif path.exists() and not replace:
+        problem = "this is there already; check that it may be replaced, or give another name"
+    elif path.exists() and path.resolve() == project.path.resolve():
+        if path.read_text(encoding="utf-8-sig") != project.text:
+            problem = "this was changed since the page read it; save under another name"
+    elif path.exists():
+        try:
+            read_data(path)
+        except FileError:
+            problem = "this is no project of pcmc, so it is not replaced; give another name"
     if problem:
         raise FileError(f"{name!r:.60}: {problem}", what="name", found=name[:60])
-    return roof.project, roof.project.path.parent / name
+    return project, path
 
 
 def project_with(
@@ -305,15 +303,13 @@ def project_with(
     if stem and stem != old:
         output = data.get("output", {})
         for key in OUTPUTS & output.keys():
-            names = output[key]
-            one = isinstance(names, str)
-            output[key] = _renamed(names, old, stem) if one else [_renamed(n, old, stem) for n in names]
+            given_one = isinstance(names := output[key], str)
+            output[key] = _renamed(names, old, stem) if given_one else [_renamed(n, old, stem) for n in names]
     if found and given is None:
         document["targets"] = tomlkit.table()
         for key, entries in found.items():
             document["targets"][key] = tomlkit.array()
-            for entry in entries:
-                document["targets"][key].append(_item(tomlkit, entry))
+            document["targets"][key].extend(_item(tomlkit, entry) for entry in entries)
     _change(tomlkit, document, data)
     if dropped:
         document.add(tomlkit.nl())

@@ -23,11 +23,10 @@ from ..project.writing import certified_files
 from ..surface import Surface
 from ..surface.images import expect_no_images
 from . import page_data
-from .acts import Turn
 from .following import ProjectFallback, Stop
 from .listening import ACTS, LOOPBACK, REQUESTS, PageHandler, RequestError, check_request, listen, pack
 from .roof import ShownRoof, Watch, save, signature
-from .session import Session, SessionState, solved_start
+from .session import Session, SessionState, Turn, solved_start
 
 LEFT_OUT = "members are left out: they are known for a part of the roof alone"
 MOST_SESSIONS = 32  # more pages than this end the least recently used session
@@ -152,6 +151,9 @@ class Explorer:
         header, fields = self._shown(state)
         left_out = LEFT_OUT if has_members(roof.outcome) and "member_ends" not in fields else ""
         untouched = state.surface is self.start.surface  # the note is about the start
+        targets, vary = state.aims or roof.aims
+        aims = {"targets": [{**vars(target), "label": target.label} for target in targets]}
+        aims["vary"] = [{"label": parameter.label, "parameter": vars(parameter)} for parameter in vary]
         once = {
             "session": name,
             "formats": list(FORMATS),
@@ -164,7 +166,7 @@ class Explorer:
             "project": roof.project is not None and self.local,
             "file": roof.path.name if roof.path is not None else "",
             "quantities": page_data.target_choices(state.surface),
-            "aims": page_data.aims_data(*(state.aims or roof.aims)),
+            "aims": aims,
             "watching": self.watch is not None,
             "version": self.version,
             "superseded": False,

@@ -1,19 +1,18 @@
 """The session of one page: the surface it shows, the values it asks for, and the steps to undo.
 
 A session shows only surfaces at rest. If there is none for the values asked for, the last one stays, and the
-certificate of the failed attempt gives the reason.
+certificate of the failed attempt gives the reason. Its acts are answered as they were sent, one at a time.
 """
 
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, wraps
 from itertools import count
-from typing import Any, TypeVar
+from typing import Any
 
 from ..accuracy import Margin, MeshCheck, check_mesh, margin
 from ..base.errors import OptionError
@@ -21,28 +20,25 @@ from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, certify
 from ..certificate.quantities import figures
 from ..certificate.theorem import Theorem, verify
-from ..design import Parameter, Target, meet
+from ..design import meet
 from ..equilibria import Equilibria, find_equilibria
 from ..meshing.remeshing import remesh
 from ..project.values import changeable_values
 from ..solvers import solve, solve_once
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
-from .acts import act
 from .following import AT_REST, ProjectFallback, Reached, Stop, Values, reach, solve_until, until, wanted
-from .roof import Aims
+from .roof import Aims, Targets, Varied
 
 FOLLOW: dict[str, Any] = {"iterations": 12, "tolerance": 1e-9}  # while a slider moves
 SETTLE: dict[str, Any] = {"iterations": 40, "tolerance": 1e-11}  # when it is let go
 FOLLOW_SECONDS = 1.0  # time limit of following, and as much again for each 50 000 triangles
 SETTLE_SECONDS = 6.0  # time limit of settling
-MOST_STEPS = 200  # to undo
-MOST_BYTES = 64_000_000  # of vertices in these steps
+MOST_STEPS, MOST_BYTES = 200, 64_000_000  # to undo, and of vertices in these steps
 MOST_VARIANTS = 20
-
-Found = TypeVar("Found")
+OVERTAKEN = 1.0  # seconds that an act waits for one that its page sent before it, on another connection
 Check = Callable[[object], None]  # tells a step; raises StopIteration once the page shows another surface
-Advised = Callable[[MeshCheck, Callable[[str], None]], MeshCheck]  # with what to type; tells its progress
+Advised = Callable[[MeshCheck, Check], MeshCheck]  # with what to type
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +97,9 @@ class SessionState:
 
     def showing(self, surface: Surface, certificate: Certificate | None = None) -> SessionState:
         """Another surface, with the values that it has; only the start may not be at rest."""
-        certificate = certificate or certify(surface)
-        failure = None if certificate.verdict in AT_REST else certificate
-        return replace(self, surface=surface, certificate=certificate, wanted=surface, failure=failure)
+        ended = certificate or certify(surface)
+        failure = None if ended.verdict in AT_REST else ended
+        return replace(self, surface=surface, certificate=ended, wanted=surface, failure=failure)
 
     def following(self, way: Reached, certificate: Certificate | None) -> SessionState:
         """The last surface at rest on the way to the values asked for."""
@@ -133,17 +129,60 @@ class SessionState:
 
 def solved_start(surface: Surface) -> SessionState:
     """Solve a surface, unless it is at rest already; if no solver converges, return it unchanged."""
-    certificate = certify(surface)
-    failure = None if certificate.verdict in AT_REST else certificate
+    certificate = ended = certify(surface)
+    if certificate.verdict in AT_REST:
+        return SessionState(surface, certificate, surface)
     for solver, target in ((solve_once, "stationary"), (solve, "minimum")):
-        if failure is None:
-            break
         result = solver(surface, target=target)
         ended = result.certify()
         if ended.verdict in AT_REST:
             return SessionState(result.surface, ended, result.surface)
-        failure = ended
-    return SessionState(surface, certificate, surface, failure)
+    return SessionState(surface, certificate, surface, failure=ended)
+
+
+Turn = tuple[str, int]  # a page, and the number of its act
+Act = Callable[..., SessionState]
+
+
+def act(moves: bool = False, ends: bool = False) -> Callable[[Act], Act]:
+    """A method that makes a state of the present one, done after the acts before it.
+
+    One that ``moves``, or ``ends`` moves, ends those before it: their ``stop`` becomes true.
+    """
+
+    def made(method: Act) -> Act:
+        @wraps(method)
+        def run(self: Session, *given: Any, turn: Turn | None = None, **named: Any) -> SessionState:
+            with self.order:
+                if turn is not None:
+                    page, number = turn
+                    self.order.wait_for(lambda: self.turns.get(page, 0) >= number, OVERTAKEN)
+                    self.turns[page] = max(number + 1, self.turns.get(page, 0))
+                    self.order.notify_all()
+                mine, self.arrived = self.arrived, self.arrived + 1
+                if moves or ends:
+                    self.newest = mine
+                self.order.wait_for(lambda: self.served == mine)
+
+            def late() -> bool:
+                return moves and self.newest > mine
+
+            try:
+                with self.turn if moves else nullcontext():
+                    fresh: dict[str, Any] = {"message": "", "met": False, "note": "", "superseded": False}
+                    before = replace(self.now, number=self.now.number + 1, **fresh)
+                    self.now = before if late() else method(self, before, late, *given, **named)
+                    if late():
+                        self.now = replace(self.now, wanted=before.wanted, superseded=True)
+                    return self.now
+            finally:
+                with self.order:
+                    self.served += 1
+                    self.order.notify_all()
+
+        return run
+
+    return made
 
 
 @dataclass
@@ -183,17 +222,16 @@ class Session:
     def follow(self, state: SessionState, stop: Stop, values: Values) -> SessionState:
         """Move towards these values while a slider moves: as far as two quick attempts lead."""
         state = state.asking(values)
-        end = time.monotonic() + FOLLOW_SECONDS * (1.0 + state.wanted.m / 50_000)
-        way = reach(state.surface, state.wanted, until(stop, end), attempts=2, **FOLLOW)
+        late = until(stop, FOLLOW_SECONDS * (1.0 + state.wanted.m / 50_000))
+        way = reach(state.surface, state.wanted, late, attempts=2, **FOLLOW)
         failed = way.failed if way.certificate is None else None
         return state if stop() else state.following(replace(way, failed=failed), way.certificate)
 
     @act(moves=True)
     def settle(self, state: SessionState, stop: Stop, values: Values) -> SessionState:
         """Move to these values, or as close as possible; the surface reached is a step of ``undo``."""
-        state, end = state.asking(values), time.monotonic() + SETTLE_SECONDS
-        progress = partial(setattr, self, "progress")
-        settled = self.fallback.settle(state.surface, state.wanted, stop, end, progress, **SETTLE)
+        state, progress = state.asking(values), partial(setattr, self, "progress")
+        settled = self.fallback.settle(state.surface, state.wanted, stop, SETTLE_SECONDS, progress, **SETTLE)
         if stop():
             return state
         way, note, self.fallback = settled
@@ -203,39 +241,33 @@ class Session:
     @act(moves=True)
     def stabilise(self, state: SessionState, stop: Stop) -> SessionState:
         """Move from a saddle to a stable shape, if there is one nearby."""
-        end = time.monotonic() + SETTLE_SECONDS
-        result = solve_until(state.surface, until(stop, end), target="minimum")
-        certificate = result.certify()
+        result = solve_until(state.surface, until(stop, SETTLE_SECONDS), target="minimum")
+        ended = result.certify()
         if stop():
             return state
-        if certificate.verdict not in AT_REST:
-            return replace(state, failure=certificate)
-        return replace(state.showing(result.surface, certificate), wanted=state.wanted).stepped()
+        if ended.verdict not in AT_REST:
+            return replace(state, failure=ended)
+        return replace(state.showing(result.surface, ended), wanted=state.wanted).stepped()
 
     @act(moves=True)
     def remesh(self, state: SessionState, stop: Stop) -> SessionState:
         """New triangles of the mean size for the surface shown, and from there to the values asked for."""
-        asked, end = changeable_values(state.wanted), time.monotonic() + 2.0 * SETTLE_SECONDS
+        asked, late = changeable_values(state.wanted), until(stop, 2.0 * SETTLE_SECONDS)
         mean = segment_lengths(state.surface.vertices, state.surface.topology.edges).mean()
-        result = solve_until(remesh(state.surface, float(mean)), until(stop, end), **SETTLE)
+        result = solve_until(remesh(state.surface, float(mean)), late, **SETTLE)
         if stop():
             return state
         if result.certificate.verdict not in AT_REST:
             return replace(state, failure=result.certificate)
         state = state.showing(result.surface).stepped().asking(asked)
         if changeable_values(state.surface) != asked:
-            way = reach(state.surface, state.wanted, until(stop, end), **SETTLE)
+            way = reach(state.surface, state.wanted, late, **SETTLE)
             state = state.following(way, None).stepped()
         return state
 
     @act(moves=True)
     def meet(
-        self,
-        state: SessionState,
-        stop: Stop,
-        targets: tuple[Target, ...],
-        vary: tuple[Parameter, ...],
-        gone: Stop = lambda: False,
+        self, state: SessionState, stop: Stop, targets: Targets, vary: Varied, gone: Stop = lambda: False
     ) -> SessionState:
         """Move to values that meet the targets; ``message`` says why not. ``gone``: the page is closed."""
         solves = count(1)
@@ -251,11 +283,11 @@ class Session:
             self.progress = ""
         if stop():
             return state
-        certificate, message = design.certificate, design.text(self.units)
-        if design.met and certificate.verdict in AT_REST:
+        ended, message = design.certificate, design.text(self.units)
+        if design.met and ended.verdict in AT_REST:
             state = replace(state.showing(design.surface), aims=(targets, vary), met=True).stepped()
         elif design.met:
-            message += f"; but {certificate.verdict.value}; {certificate.detail}"
+            message += f"; but {ended.verdict.value}; {ended.detail}"
         return replace(state, message=message)
 
     @act()
@@ -263,7 +295,7 @@ class Session:
         """Keep the surface shown as a variant; one of the same name is replaced."""
         kept = {variant.name: variant for variant in state.variants}
         if name not in kept and len(kept) >= MOST_VARIANTS:
-            text = f"there are {MOST_VARIANTS} variants; remove one first"
+            text = f"there are {len(kept)} variants; remove one first"
             raise OptionError(text, what="variants", found=len(kept))
         kept[name] = Variant(name, state.surface, certify(state.surface))
         return replace(state, variants=tuple(kept.values()))
@@ -299,16 +331,11 @@ class Session:
 
     @act(ends=True)
     def renew(
-        self,
-        state: SessionState,
-        stop: Stop,
-        start: SessionState,
-        units: Units = NO_UNITS,
-        fallback: ProjectFallback | None = None,
+        self, state: SessionState, stop: Stop, start: SessionState, units: Units, fallback: ProjectFallback
     ) -> SessionState:
         """Show another start, as a new step: the file behind the page was saved."""
         self.start, self.units, self.found = start, units, None
-        self.fallback = (fallback or self.fallback).with_walls(start.surface)
+        self.fallback = fallback.with_walls(start.surface)
         return replace(state.showing(start.surface, start.certificate), aims=None).stepped()
 
     @act(ends=True)
@@ -332,8 +359,7 @@ class Session:
         return state.showing(self.start.surface).stepped()
 
     def check_mesh(self, gone: Stop = lambda: False, advised: Advised = lambda c, _: c) -> MeshCheck | None:
-        """The mesh check of the surface shown, with what to type of ``advised``; None if the page shows
-        another one, or is closed, before."""
+        """The mesh check of the surface shown, ``advised``; None if the page closes or shows another."""
         return self._look(lambda shown, check: advised(check_mesh(shown, callback=check), check), gone)
 
     def margin(self, what: str, gone: Stop = lambda: False) -> Margin | None:
@@ -343,17 +369,17 @@ class Session:
     def equilibria(self, what: str, gone: Stop = lambda: False) -> Equilibria | None:
         """The equilibria at the values shown, by branches in one of these; None as for ``check_mesh``."""
         found = self._look(lambda shown, check: find_equilibria(shown, what, callback=check), gone)
-        if found is None or found.stopped:
-            return None
-        self.found = found
-        return found
+        if found is not None and not found.stopped:
+            self.found = found
+            return found
+        return None
 
     def verify(self) -> Theorem:
         """What is proved of the surface shown."""
         with self.checks:
             return verify(self.surface)
 
-    def _look(self, at: Callable[[Surface, Check], Found], gone: Stop) -> Found | None:
+    def _look(self, at: Callable[[Surface, Check], Any], gone: Stop) -> Any:
         shown = self.surface
 
         def check(step: object) -> None:

@@ -96,11 +96,6 @@ def heavy_cable_pulls(surface: Surface) -> Floats:
     return np.where(surface.cable_edges.weight != 0.0, cable_pulls(surface, surface.vertices), np.inf)
 
 
-def squared_cable_forces(surface: Surface, X: Floats) -> Floats:
-    """(c,) squared pulls at both ends of each edge, added up, force²."""
-    return np.asarray(2.0 * cable_pulls(surface, X) ** 2)
-
-
 def laws_on(topo: Topology, surface: Surface) -> Floats:
     """(e,2) the line tension, force, and weight, force/length, on each edge of a topology.
 

@@ -53,13 +53,13 @@ def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
 @kept_with_owner
 def _mean_curvatures(surface: Surface) -> tuple[Floats, Floats]:
     """H (n,) by each of ``METHODS``."""
-    area_gradient = weighted(surface, np.ones(len(surface.patches)))[2]
+    area_gradient = weighted(surface, np.ones(len(surface.patches)))[1]
     area_vector, star_area = vertex_area_vectors(surface.vertices, surface.faces, surface.topology.faces)
     if surface.order > 1:
         normal = normal_vectors(surface, vertex_classes(surface), surface.vertices)
         symmetric_part(surface.on_planes, normal)
         normal /= np.where(normal.any(axis=1), np.linalg.norm(normal, axis=1), 1.0)[:, None]
-        share = 3.0 * np.einsum("ij,ij->i", weighted(surface, 0.0, -1.0)[2], normal)
+        share = 3.0 * np.einsum("ij,ij->i", weighted(surface, 0.0, -1.0)[1], normal)
         share[np.abs(share) < NO_SHARE * star_area] = np.nan
         area_vector, star_area = share[:, None] * normal, np.abs(share)
     symmetric_part(surface.on_planes, area_gradient)

@@ -44,25 +44,15 @@ class Mesh(NamedTuple):
         faces, rows = self.faces[first:last], self.rows[first:last]
         return self._replace(faces=faces, rows=rows, patch=self.patch[first:last])
 
-    def weighing(self, weight: Floats | None = None) -> Mesh:
-        """With these weights alone, no tension and no pressure; None for no weights, and both as they are."""
-        none = read_only(np.zeros_like(self.tension))
-        if weight is None:
-            return self._replace(weight=none)
-        return self._replace(tension=none, pressure=none, weight=read_only(weight.view()))
 
-
-def energy_mesh(surface: Surface, tension: Floats | None = None, pressure: Floats | None = None) -> Mesh:
-    """All elements of a surface, with its own tensions and pressures (k,) or with others."""
-    of_elements = shapes(surface.order)
-    tension = surface.tensions if tension is None else read_only(tension)
-    pressure = surface.net_pressures if pressure is None else read_only(pressure)
-    plane = np.array(surface.plane.point), np.array(surface.plane.normal)
-    patch = read_only(np.ascontiguousarray(surface.patch_of_face[:: surface.order**2]))
-    nodes = surface.nodes
+def energy_mesh(surface: Surface, *laws: Floats) -> Mesh:
+    """All elements of a surface, with its own tensions, net pressures and weights (k,), or three others."""
+    alpha, p, w = map(read_only, laws or (surface.tensions, surface.net_pressures, surface.weights))
+    ground, normal = np.array(surface.plane.point), np.array(surface.plane.normal)
+    nodes, of_elements = surface.nodes, shapes(surface.order)
     rows = surface.topology.faces if surface.periodic else nodes
-    of_patches = tension, pressure, surface.weights
-    return Mesh(nodes, rows, patch, surface.origin, *of_patches, *plane, of_elements)
+    patch = read_only(np.ascontiguousarray(surface.patch_of_face[:: surface.order**2]))
+    return Mesh(nodes, rows, patch, surface.origin, alpha, p, w, ground, normal, of_elements)
 
 
 class Points(NamedTuple):
@@ -89,18 +79,6 @@ class Elements(NamedTuple):
     gradient: Callable[[], Floats]  # (e,k,3) ∂/∂x_i, computed when asked for like those below
     hessian: Callable[[], Floats]  # (e,k,k,3,3) ∂²/∂x_i∂x_j
     stiffness: Callable[[], Floats] | None = None  # (e,k,k) multiples of 1 in L; None where there are none
-
-    def times(self, factor: Floats) -> Elements:
-        """The elements with energies that are ``factor`` (e,) as large, without those of 0."""
-        some = slice(None) if factor.all() else np.flatnonzero(factor)
-        f, stiffness = factor[some], self.stiffness
-        return Elements(
-            self.vertices[some],
-            f * self.value[some],
-            lambda: f[:, None, None] * self.gradient()[some],
-            lambda: f[:, None, None, None, None] * self.hessian()[some],
-            None if stiffness is None else lambda: f[:, None, None] * stiffness()[some],
-        )
 
 
 def add_values(forces: Iterable[Elements], gradient: Floats | None = None) -> float:

@@ -56,13 +56,20 @@ EMPTY, FLAT = np.empty(0, dtype=np.int64), np.empty((0, 3))
 NONE = FlatPieces(EMPTY, EMPTY, FLAT, EMPTY, EMPTY, FLAT)
 
 
-def volumes(surface: Surface, X: Floats) -> list[tuple[Ints, Elements]]:
-    """The volumes of the flat pieces, by sides and by ends, and the patch of each; vertices at X (n,3)."""
+def volumes(surface: Surface, X: Floats, factors: Floats | None = None) -> list[tuple[Ints, Elements]]:
+    """The volumes of the flat pieces, by sides and by ends, and the patch of each; vertices at X (n,3).
+
+    They are multiplied by ``factors`` (k,) of the patches; pieces whose factor is 0 are left out.
+    """
     if not (pieces := flat_pieces(surface)):
         return []
-    ends = surface.faces[pieces.face[:, None], (pieces.corner[:, None] + [0, 1]) % 3]
-    c, vertex = pieces.apex, surface.original
-    seen = X - surface.origin
+    factors = np.ones(len(surface.patches)) if factors is None else factors
+    patches = surface.patch_of_face[pieces.face], pieces.end_patch
+    seen, vertex = X - surface.origin, surface.original
+    of_side, of_end = (factors[patch] for patch in patches)
+    used, last = np.flatnonzero(of_side), np.flatnonzero(of_end)
+    face, corner = pieces.face[used, None], pieces.corner[used, None]
+    ends, c = surface.faces[face, np.add(corner, [0, 1]) % 3], of_side[used, None] * pieces.apex[used]
     a, b = seen[ends[:, 0]], seen[ends[:, 1]]
 
     def hessian() -> Floats:
@@ -74,16 +81,16 @@ def volumes(surface: Surface, X: Floats) -> list[tuple[Ints, Elements]]:
         return np.stack([np.cross(c, b), -np.cross(c, a)], axis=1) / 6.0
 
     sides = Elements(vertex[ends], -np.einsum("ij,ij->i", c, np.cross(a, b)) / 6.0, gradient, hessian)
-    at_ends = np.einsum("ij,ij->i", pieces.normal, seen[pieces.end])
-    zero = np.zeros((len(pieces.end), 1, 1, 3, 3))
-    points = Elements(vertex[pieces.end[:, None]], at_ends, lambda: pieces.normal[:, None], lambda: zero)
-    return [(surface.patch_of_face[pieces.face], sides), (pieces.end_patch, points)]
+    end, normal = pieces.end[last], of_end[last, None] * pieces.normal[last]
+    at_ends, zero = np.einsum("ij,ij->i", normal, seen[end]), np.zeros((len(end), 1, 1, 3, 3))
+    points = Elements(vertex[end[:, None]], at_ends, lambda: normal[:, None], lambda: zero)
+    return [(patches[0][used], sides), (patches[1][last], points)]
 
 
 def elements(surface: Surface, X: Floats, pressures: Floats | None = None) -> Iterator[Elements]:
     """-Σ p V of the flat pieces, with the surface's net pressures or others (k,)."""
     p = surface.net_pressures if pressures is None else pressures
-    return (pieces.times(-p[patch]) for patch, pieces in volumes(surface, X))
+    return (pieces for _, pieces in volumes(surface, X, -p))
 
 
 def add_plane_volumes(surface: Surface, X: Floats, sums: Floats) -> Floats:

@@ -28,9 +28,9 @@ from ..base.arrays import Floats
 from ..surface import Surface, expect_surface
 from ..surface.supports import apply_supports
 from . import cables, flat_pieces
-from .elements import Elements, add_values, energy_mesh
+from .elements import Elements, Mesh, add_values, energy_mesh
 from .flat_pieces import add_plane_volumes
-from .triangles import add_weights, areas_and_volumes, moments, totals_and_gradient
+from .triangles import totals_and_gradient
 
 FORCES = (cables.elements, flat_pieces.elements)
 Rates = Mapping[str, Floats]
@@ -59,8 +59,8 @@ def energy_at(surface: Surface, X: Floats) -> float:
     >>> energy_at(flat, 2.0 * flat.vertices)  # α A, of four times the area
     6.0
     """
-    areas, volumes = areas_and_volumes(energy_mesh(surface), X)
-    return total(surface.tensions, areas, surface.net_pressures, volumes) + add_forces(surface, X)
+    mesh = energy_mesh(surface)
+    return total(mesh, totals_and_gradient(mesh, X, sums_alone=True)[0]) + add_forces(surface, X)
 
 
 def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
@@ -69,13 +69,15 @@ def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
 
 
 def add_forces(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
-    """The energy at X (n,3) but for Σ α A - Σ p V of triangles; its gradient is added to ``gradient``."""
-    return add_values(elements(surface, X), gradient) + add_weights(surface, X, gradient)
+    """The energy at X (n,3) of all ``FORCES``; its gradient is added to ``gradient`` (n,3)."""
+    return add_values(elements(surface, X), gradient)
 
 
-def total(tensions: Floats, areas: Floats, pressures: Floats, volumes: Floats) -> float:
-    """E of the patches' areas and volumes. Sums: BLAS rounds dot products differently on each processor."""
-    return float((tensions * areas).sum() - (pressures * volumes).sum())
+def total(mesh: Mesh, sums: Floats) -> float:
+    """E of A, V and ∫ z dA (3,k) of patches. Sums: BLAS rounds dot products differently on each processor."""
+    areas, volumes, moments = sums
+    surfaces = (mesh.tension * areas).sum() - (mesh.pressure * volumes).sum()
+    return float(surfaces + (mesh.weight * moments).sum())
 
 
 def energy_and_gradient(
@@ -96,12 +98,13 @@ def energy_and_gradient(
     [0.0, 0.0, 0.0]
     """
     X = surface.vertices if X is None else X
-    areas, volumes, gradient = totals_and_gradient(energy_mesh(surface), X, workers)
+    mesh = energy_mesh(surface)
+    sums, gradient = totals_and_gradient(mesh, X, workers)
     further = add_forces(surface, X, gradient)
     surface.folded(gradient)
     if supports:
         apply_supports(surface, gradient, X)
-    return total(surface.tensions, areas, surface.net_pressures, volumes) + further, gradient
+    return total(mesh, sums) + further, gradient
 
 
 def gradient(surface: Surface) -> Floats:
@@ -123,25 +126,34 @@ def gradient(surface: Surface) -> Floats:
 
 
 def weighted(
-    surface: Surface, tensions: Floats | float = 0.0, pressures: Floats | float = 0.0, X: Floats | None = None
-) -> tuple[Floats, Floats, Floats]:
-    """A_i and V_i (k,), and Σ α ∇A - p ∇V (n,3), supports not applied, with other α and p (k,)."""
-    alpha, p = (np.full(len(surface.patches), weights, dtype=float) for weights in (tensions, pressures))
+    surface: Surface,
+    tensions: Floats | float = 0.0,
+    pressures: Floats | float = 0.0,
+    X: Floats | None = None,
+    weights: Floats | float = 0.0,
+) -> tuple[Floats, Floats]:
+    """A, V and ∫ z dA (3,k), and Σ α ∇A - p ∇V + w ∇∫ z dA (n,3), supports not applied, with other α, p, w.
+
+    ∫ z dA is 0 where all w are. Flat pieces are part of V.
+    """
+    laws = [np.full(len(surface.patches), each, dtype=float) for each in (tensions, pressures, weights)]
     X = surface.vertices if X is None else X
-    areas, volumes, forces = totals_and_gradient(energy_mesh(surface, alpha, p), X)
-    add_values(flat_pieces.elements(surface, X, p), forces)
-    return areas, add_plane_volumes(surface, X, volumes), surface.folded(forces)
+    sums, forces = totals_and_gradient(energy_mesh(surface, *laws), X)
+    add_values(flat_pieces.elements(surface, X, laws[1]), forces)
+    add_plane_volumes(surface, X, sums[1])
+    return sums, surface.folded(forces)
 
 
 def patch_areas(surface: Surface) -> Floats:
     """(k,) area A_i of each patch, length²."""
-    return areas_and_volumes(energy_mesh(surface), surface.vertices)[0]
+    return totals_and_gradient(energy_mesh(surface), surface.vertices, sums_alone=True)[0][0]
 
 
 def patch_volumes(surface: Surface, X: Floats | None = None) -> Floats:
     """(k,) signed volume V_i of each patch's cone to ``surface.origin``, length³ (10b), with flat pieces."""
     X = surface.vertices if X is None else X
-    return add_plane_volumes(surface, X, areas_and_volumes(energy_mesh(surface), X)[1])
+    sums = totals_and_gradient(energy_mesh(surface), X, sums_alone=True)[0]
+    return add_plane_volumes(surface, X, sums[1])
 
 
 def volume(surface: Surface) -> float:
@@ -159,11 +171,10 @@ def by_rates(surface: Surface, rates: Rates, X: Floats | None = None) -> tuple[f
     A prescribed volume is a condition beside E, and no part of it.
     """
     X, none = surface.vertices if X is None else X, np.zeros(len(surface.patches))
-    tensions, net = rates.get("tensions", none), rates.get("pressures", none) - rates.get("snows", none)
-    areas, volumes, out = weighted(surface, tensions, net, X)
-    change = total(tensions, areas, net, volumes)
-    if "weights" in rates:
-        change += float(rates["weights"] @ moments(surface, X, rates["weights"], out))
+    net, tensions = rates.get("pressures", none) - rates.get("snows", none), rates.get("tensions", none)
+    weights = rates.get("weights", none)
+    sums, out = weighted(surface, tensions, net, X, weights)
+    change = float((np.stack([tensions, -net, weights]) * sums).sum())
     none, elements = np.zeros(len(surface.cables)), list[Elements]()
     pulls, weights = rates.get("cables", none), rates.get("cable_weights", none)
     for cable, pull, weight in zip(surface.cables, pulls, weights, strict=True):

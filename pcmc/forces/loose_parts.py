@@ -11,7 +11,6 @@ from ..base.arrays import Floats, Ints
 from ..surface import Surface
 from ..surface.geometry import squared_sides
 from ..surface.topology import SHEET, Topology, components
-from .cables import squared_cable_forces
 from .motion_space import VertexClasses, force_scale, squared_forces
 
 
@@ -20,10 +19,8 @@ def relative_forces(surface: Surface, classes: VertexClasses, X: Floats, left: F
     parts = surface.topology.components
     if not surface.topology.in_parts:
         return float(np.linalg.norm(left)) / force_scale(surface, classes, X)
-    own, part_of = squared_forces(surface, classes, X), parts[classes.faces[:, 0]]
-    if surface.cables:
-        own = np.append(own, squared_cable_forces(surface, X))
-        part_of = np.append(part_of, parts[surface.cable_edges.ends[:, 0]])
+    part_of = parts[np.append(classes.faces[:, 0], surface.cable_edges.ends[:, 0])]
+    own = squared_forces(surface, classes, X)
     return float(np.sqrt(ratios(left, parts, own, part_of).max(initial=0.0)))
 
 
@@ -53,7 +50,7 @@ def patch_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> F
     Of a patch with several islands, the worst one counts.
     """
     island = islands(surface.topology)[classes.active]
-    own = squared_forces(surface, classes, surface.vertices)
+    own = squared_forces(surface, classes, surface.vertices)[: len(island)]
     island_of_vertex = np.zeros(surface.n, dtype=np.int64)
     island_of_vertex[classes.topology.faces] = island[:, None]
     inside = left * (classes.kind == SHEET)[:, None]

@@ -50,7 +50,7 @@ from ..surface.topology import (
     one_sided_copies,
     vertex_kind,
 )
-from .cables import laws_on, squared_cable_forces
+from .cables import cable_pulls, laws_on
 from .elements import Mesh, energy_mesh
 from .triangles import effective_tensions
 
@@ -287,20 +287,17 @@ def curve_chords(surface: Surface, classes: VertexClasses, X: Floats) -> Floats:
 
 
 def force_scale(surface: Surface, of: VertexClasses | Surface, X: Floats) -> float:
-    """The norm of the single forces that cancel at rest: ½ α |e| of triangles, τ of cable edges, force.
-
-    Of the active triangles, or of all; with a weight, α + w z stands for α; 1 without tension.
-    """
-    squared = float(squared_forces(surface, of, X).sum())
-    if surface.cables:
-        squared += float(squared_cable_forces(surface, X).sum())
-    return sqrt(squared) or 1.0
+    """The norm of ``squared_forces``, the single forces that cancel at rest; 1 without any."""
+    return sqrt(float(squared_forces(surface, of, X).sum())) or 1.0
 
 
 def squared_forces(surface: Surface, of: VertexClasses | Surface, X: Floats) -> Floats:
-    """(m,) the squared tension forces ½ α |e| of each triangle, added up, force²; α + w z with a weight."""
+    """(m+c,) squared forces ½ α |e| of each active triangle, or of all, then τ of each cable edge, force².
+
+    Those of its sides, or both ends, are added up; with weights α + w z and τ + g z take their places.
+    """
     tension = effective_tensions(surface, X, of.faces, of.patch_of_face)
-    return np.asarray(0.25 * tension**2 * squared_sides(X, of.faces))
+    return np.append(0.25 * tension**2 * squared_sides(X, of.faces), 2.0 * cable_pulls(surface, X) ** 2)
 
 
 @inlined

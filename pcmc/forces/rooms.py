@@ -67,7 +67,7 @@ def room_volume_gradients(surface: Surface, X: Floats | None = None) -> Floats:
     [0.0, 0.0, 1.333333333333]
     """
     expect_surface(surface)
-    gradients = [apply_supports(surface, weighted(surface, 0.0, -s, X)[2], X) for s in surface.room_signs]
+    gradients = [apply_supports(surface, weighted(surface, 0.0, -s, X)[1], X) for s in surface.room_signs]
     return np.array(gradients).reshape(len(surface.rooms), surface.n, 3)
 
 

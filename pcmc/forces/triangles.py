@@ -17,7 +17,7 @@ k = T₊ (e_i·e_j) / (4A), T₊ = α + max(w z̄, 0).
 A sheet of weight w acts like one of tension α + w z, pushed by w n per area: at rest
 H = (p - w ⟨ν, n⟩) / (2 (α + w z)). Where α + w z ≤ 0 it is under compression. A triangle without area has no
 normal and no area gradient. Every loop releases the interpreter, so that blocks of triangles run on several
-threads. Nothing is computed for weights where no patch has one.
+threads. Where a patch has a weight, the sums and the gradient are those of ``curved``, of order 1.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ..base.compiled import blocks, compiled, inlined, run_blocks, threads
 from ..surface import Surface
 from ..surface.geometry import Vector, accumulate, add, cross, dot, norm, point, scaled, sub, vector
 from .curved import measure_elements
-from .elements import Mesh, energy_mesh
+from .elements import Mesh
 
 
 @compiled
@@ -74,78 +74,28 @@ def measure_block(
 
 def totals_and_gradient(
     mesh: Mesh, X: Floats, workers: int | None = None, sums_alone: bool = False
-) -> tuple[Floats, Floats, Floats]:
-    """Areas (k,), volumes (k,) of the k patches and the gradient (n,3) of Σ αA - pV in one pass.
+) -> tuple[Floats, Floats]:
+    """A, V and ∫ z dA (3,k) of the k patches, and the gradient (n,3) of Σ αA - pV + w ∫ z dA, in one pass.
 
-    Each block sums into arrays of its own, added in order: the same number of workers gives the
-    same bytes, and a mesh under two BLOCKs the same bytes on every machine.
+    ∫ z dA of flat triangles is 0 where nothing has a weight. Each block sums into arrays of its own, added in
+    order: the same number of workers gives the same bytes, and a mesh under two BLOCKs the same bytes on
+    every machine.
     """
-    parts = len(blocks(len(mesh.faces), workers or threads()))
-    area, volume, moment = np.zeros((3, parts, len(mesh.tension)))
+    parts, heavy = len(blocks(len(mesh.faces), workers or threads())), mesh.weight.any()
+    sums = np.zeros((parts, 3, len(mesh.tension)))
     gradient = [np.zeros((0, 3) if sums_alone else X.shape) for _ in range(parts)]
-    weightless = mesh.weighing()
 
     def work(part: int, first: int, last: int) -> None:
-        if mesh.curved:
-            sums = area[part], volume[part], moment[part]
-            measure_elements(weightless, X, first, last, *sums, gradient[part])
+        area, volume, moment = sums[part]
+        if mesh.curved or heavy:
+            measure_elements(mesh, X, first, last, area, volume, moment, gradient[part])
         else:
-            measure_block(mesh, X, first, last, area[part], volume[part], gradient[part])
+            measure_block(mesh, X, first, last, area, volume, gradient[part])
 
     run_blocks(work, len(mesh.faces), workers)
     for other in gradient[1:]:
         gradient[0] += other
-    return area.sum(axis=0), volume.sum(axis=0), gradient[0]
-
-
-def areas_and_volumes(mesh: Mesh, X: Floats) -> tuple[Floats, Floats]:
-    """Areas (k,) and signed volumes (k,), seen from the mesh's origin, of the k patches."""
-    return totals_and_gradient(mesh, X, sums_alone=True)[:2]
-
-
-def add_weights(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
-    """Σ w ∫ z dA at X (n,3), force·length; its gradient is added to ``gradient`` (n,3) if that is given.
-
-    >>> from pcmc import Patch
-    >>> table = Surface([[0, 0, 2], [1, 0, 2], [0, 1, 2]], [[0, 1, 2]], [0],
-    ...                 [Patch("a", 1.0, weight=3.0)], fixed=[0])
-    >>> add_weights(table, table.vertices)
-    3.0
-    """
-    if not surface.weights.any():
-        return 0.0
-    return float((surface.weights * moments(surface, X, surface.weights, gradient)).sum())
-
-
-def moments(surface: Surface, X: Floats, weights: Floats, gradient: Floats | None = None) -> Floats:
-    """(k,) ∫ z dA of each patch, length³; the gradient of Σ w ∫ z dA is added to ``gradient`` (n,3)."""
-    moment, out = np.zeros(len(surface.patches)), np.empty((0, 3)) if gradient is None else gradient
-    mesh = energy_mesh(surface).weighing(weights)
-    if mesh.curved:
-        area, volume = np.zeros((2, len(moment)))
-        measure_elements(mesh, X, 0, len(mesh.faces), area, volume, moment, out)
-    else:
-        _measure_moments(mesh, X, moment, out)
-    return moment
-
-
-@compiled
-def _measure_moments(mesh: Mesh, X: Floats, moment: Floats, out: Floats) -> None:
-    F, ground, n = mesh.faces, vector(mesh.ground), vector(mesh.normal)
-    for f in range(len(F)):
-        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
-        twice = cross(sub(b, a), sub(c, a))
-        twice_area = norm(twice)
-        mean = dot(sub(scaled(1.0 / 3.0, add(add(a, b), c)), ground), n)
-        moment[mesh.patch[f]] += 0.5 * twice_area * mean
-        w = mesh.weight[mesh.patch[f]]
-        if len(out) == 0 or w == 0.0 or twice_area == 0.0:
-            continue
-        half_nu = scaled(0.5 * w * mean / twice_area, twice)
-        down = scaled(w * twice_area / 6.0, n)
-        accumulate(out, F[f, 0], add(cross(half_nu, sub(c, b)), down))
-        accumulate(out, F[f, 1], add(cross(half_nu, sub(a, c)), down))
-        accumulate(out, F[f, 2], add(cross(half_nu, sub(b, a)), down))
+    return sums.sum(axis=0), gradient[0]
 
 
 def effective_tensions(surface: Surface, X: Floats, faces: Ints, patch: Ints) -> Floats:

@@ -140,10 +140,8 @@ def _cables(
     chosen = np.flatnonzero((tension != 0.0) | (given & np.isin(number, [float(name) for name in names])))
     kinds, kind = np.unique(np.stack([number, tension], axis=1)[chosen], axis=0, return_inverse=True)
     known = names if len(np.unique(kinds[:, 0])) == len(kinds) else {}
-    return tuple(
-        Cable(known.get(str(int(a)), f"cable {k}"), t, ends[chosen[kind == k - 1]])
-        for k, (a, t) in enumerate(kinds.tolist(), 1)
-    )
+    rows = [(known.get(str(int(a)), f"cable {k + 1}"), t, k) for k, (a, t) in enumerate(kinds.tolist())]
+    return tuple(Cable(name, t, ends[chosen[kind == k]]) for name, t, k in rows)
 
 
 def _pressures(

@@ -94,6 +94,6 @@ def read(path: Path) -> MeshData:
             raise FileError(text, where=str(error)) from None
     mesh = from_scene(scene, path.stem, parse_metadata(scene.metadata.get("pcmc")))
     X = mesh.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
-    scalars = {k[1:]: np.where(v == NO_VALUE, np.nan, v) for k, v in mesh.scalars.items() if k[0] == "_"}
+    scalars = {k[1:]: np.where(v == NO_VALUE, np.nan, v) for k, v in mesh.scalars.items() if k[:1] == "_"}
     held = support_kinds(scalars.pop(SUPPORT[1:])) if SUPPORT in mesh.scalars else None
     return replace(mesh, vertices=X, scalars=scalars, support=held, walls=scene.metadata.get(WALLS))

@@ -60,12 +60,10 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     texts = {"Description": content.metadata} | ({} if content.walls is None else {"Walls": content.walls})
     model.add_properties("Pcmc_Surface", roof, {name: ("IfcText", text) for name, text in texts.items()})
     areas = patch_areas(surface) * model.square_metres
-    parts = [
-        model.add_part(k, color, used, faces, float(areas[k]), roof.ObjectPlacement)
-        for k, color, used, faces in patch_meshes(surface)
-    ]
-    parts += [model.add_cable(cable, roof.ObjectPlacement) for cable in surface.cables]
-    parts += [model.add_member(line, roof.ObjectPlacement) for line in content.members]
+    place = roof.ObjectPlacement
+    parts = [model.add_part(*one, float(areas[one[0]]), place) for one in patch_meshes(surface)]
+    parts += [model.add_cable(cable, place) for cable in surface.cables]
+    parts += [model.add_member(line, place) for line in content.members]
     model.aggregate("roof's parts", roof, parts)
     header = model.file.header  # without the time at which it was written
     header.file_name.time_stamp, header.file_name.originating_system = TIME, "pcmc"
@@ -253,10 +251,8 @@ class _Model:
 
     def add_properties(self, name: str, of: Any, values: Properties, role: str = "") -> None:
         """A property set of an element: the type and value of each property."""
-        listed = [
-            self.add("IfcPropertySingleValue", Name=key, NominalValue=self.add(kind, value))
-            for key, (kind, value) in values.items()
-        ]
+        rows = [(key, self.add(kind, value)) for key, (kind, value) in values.items()]
+        listed = [self.add("IfcPropertySingleValue", Name=key, NominalValue=value) for key, value in rows]
         these = self.rooted("IfcPropertySet", f"{name} {role}", Name=name, HasProperties=listed)
         ends = {"RelatedObjects": [of], "RelatingPropertyDefinition": these}
         self.rooted("IfcRelDefinesByProperties", f"{name} {role} defined", **ends)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints, Vector
+from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import NO_UNITS, Units, conversion_note, length_factor
 from ..base.validate import choice
@@ -77,10 +77,8 @@ def checked_data(data: MeshData) -> MeshData:
 def numeric(values: Any, name: str, kinds: str, shape: tuple[int | None, ...]) -> Any:
     """The array if its dtype is one of these kinds and its shape this one; None stands for any length > 0."""
     array = np.asarray(values)
-    fits = array.ndim == len(shape) and all(
-        size == wanted if wanted is not None else size > 0
-        for size, wanted in zip(array.shape, shape, strict=True)
-    )
+    sizes = zip(array.shape, shape, strict=False)
+    fits = array.ndim == len(shape) and all(n > 0 if wanted is None else n == wanted for n, wanted in sizes)
     if array.dtype.kind in kinds and fits:
         return array
     numbers = "numbers" if "f" in kinds else "whole numbers"
@@ -92,8 +90,7 @@ def numeric(values: Any, name: str, kinds: str, shape: tuple[int | None, ...]) -
 def within(numbers: Any, name: str, size: int) -> Ints:
     """The indices as int64 if all are in 0..size-1; FileError with the first that is not."""
     rows = np.asarray(numbers).reshape(len(numbers), -1)
-    bad = np.flatnonzero(((rows < 0) | (rows >= size)).any(axis=1))
-    if len(bad):
+    if len(bad := np.flatnonzero(((rows < 0) | (rows >= size)).any(axis=1))):
         found = rows[bad[0]].tolist()
         text = f"{name}: entry {bad[0]} is {str(found).strip('[]')}, outside 0..{size - 1}"
         raise FileError(text, what=name, where=int(bad[0]), found=found, expected=(0, size - 1))
@@ -110,8 +107,7 @@ def support_of(surface: Surface, planes: bool = False) -> Ints:
 def support_kinds(values: npt.ArrayLike) -> Ints:
     """(n,) int8 FREE, SLIDING or FIXED from the numbers of a file; FileError for others."""
     numbers = np.asarray(values).ravel()
-    bad = np.flatnonzero(~np.isin(numbers, (FREE, SLIDING, FIXED)))
-    if len(bad):
+    if len(bad := np.flatnonzero(~np.isin(numbers, (FREE, SLIDING, FIXED)))):
         found = numbers[bad[0]].item()
         text = f"support: entry {bad[0]} is {found!r:.30}; expected 0 (free), 1 (sliding) or 2 (fixed)"
         raise FileError(text, what="support", where=int(bad[0]), found=found, expected=(0, 1, 2))
@@ -157,17 +153,14 @@ def coincident(X: Floats) -> tuple[Ints, Ints]:
 
 def _selected(data: MeshData, keep: Ints, place: Ints) -> MeshData:
     """The same with the vertices ``keep``; ``place`` is the new index of every vertex."""
-    n = len(data.vertices)
-    return replace(
-        data,
-        vertices=data.vertices[keep],
-        faces=place[data.faces],
-        support=None if data.support is None else data.support[keep],
-        scalars={k: v[keep] if len(v) == n else v for k, v in data.scalars.items()},
-        planes=tuple((plane, mask[keep]) for plane, mask in data.planes),
-        cables=tuple(filter(None, (cable.carried(place) for cable in data.cables))),
-        curves=tuple(replace(curve, vertices=place[curve.vertices]) for curve in data.curves),
-    )
+    X, support = data.vertices, None if data.support is None else data.support[keep]
+    parts: dict[str, Any] = {
+        "scalars": {k: v[keep] if len(v) == len(X) else v for k, v in data.scalars.items()},
+        "planes": tuple((plane, mask[keep]) for plane, mask in data.planes),
+        "cables": tuple(filter(None, (cable.carried(place) for cable in data.cables))),
+        "curves": tuple(replace(curve, vertices=place[curve.vertices]) for curve in data.curves),
+    }
+    return replace(data, vertices=X[keep], faces=place[data.faces], support=support, **parts)
 
 
 def to_surface(
@@ -232,18 +225,14 @@ def in_new_unit(value: Any, factor: float) -> Any:
             powers = {kind.field: POWERS[kind.dimension] for kind in KINDS.values() if kind.parts == parts}
             old = [(f, getattr(value, f), factor ** abs(p), p > 0) for f, p in powers.items()]
             return replace(value, **{f: x * by if up else x / by for f, x, by, up in old})
-        case Plane() | Line():
-            return replace(value, point=_point(value.point, factor))
-        case Circle():
-            return replace(value, centre=_point(value.centre, factor), radius=factor * value.radius)
+        case Plane() | Line() | Circle():
+            key = value.KEYS[0]  # of its point
+            moved: dict[str, Any] = {key: tuple(factor * x for x in getattr(value, key))}
+            moved |= {"radius": factor * value.radius} if isinstance(value, Circle) else {}
+            return replace(value, **moved)
         case HeldCurve():
             return value.mapped(factor * np.eye(3), np.zeros(3))
     return value
-
-
-def _point(point: Vector, factor: float) -> Vector:
-    x, y, z = point
-    return factor * x, factor * y, factor * z
 
 
 def scaled_surface(surface: Surface, factor: float) -> Surface:
@@ -268,6 +257,5 @@ def converted(data: MeshData, length: str, assumed: str = "") -> MeshData:
     parts = {f.name: in_new_unit(getattr(data, f.name), factor) for f in fields(data)}
     parts["patches"] = tuple(p if p.name in data.bare else in_new_unit(p, factor) for p in data.patches)
     parts["vertices"] = factor * np.asarray(data.vertices, dtype=np.float64)
-    parts["units"] = Units(length, units.force)
-    parts["notes"] = (*data.notes, conversion_note(units.length, length))
-    return replace(data, **parts)
+    notes = (*data.notes, conversion_note(units.length, length))
+    return replace(data, **parts | {"units": Units(length, units.force), "notes": notes})

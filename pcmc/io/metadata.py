@@ -141,13 +141,10 @@ def parse_metadata(text: str | None) -> Metadata:
         values = json.loads(text)
         patches = [Patch(*p) for p in values["patches"]]
         point, normal = map(tuple, values["plane"])
-        return Metadata(
-            {p.name: None if p.name in values.get("bare", ()) else p for p in patches},
-            Plane(point, normal),
-            (int(values["counts"][0]), int(values["counts"][1])),
-            Units(*values.get("units", ())),
-            {key: values[key] for key in PARTS if key in values},
-        )
+        by_name = {p.name: None if p.name in values.get("bare", ()) else p for p in patches}
+        counts, units = (int(values["counts"][0]), int(values["counts"][1])), Units(*values.get("units", ()))
+        parts = {key: values[key] for key in PARTS if key in values}
+        return Metadata(by_name, Plane(point, normal), counts, units, parts)
     except DAMAGED:
         raise _damaged(text) from None
 

@@ -64,8 +64,8 @@ def read(path: Path) -> MeshData:
         meta = json.loads(str(arrays.pop("meta")))
         if not isinstance(meta, dict) or not isinstance(meta["certificate"], dict):
             raise FileError(f"its description is damaged: {str(meta)[:60]!r}", where="meta")
-        kind, version = meta["format"], meta["version"]
-        if kind != FORMAT:
+        version = meta["version"]
+        if (kind := meta["format"]) != FORMAT:
             text = f"expected the format {FORMAT!r}, found {kind!r}"
             raise FileError(text, where="format", found=kind, expected=FORMAT)
         if version > VERSION:
@@ -76,12 +76,10 @@ def read(path: Path) -> MeshData:
             raise FileError(text, where=odd[0])
         metadata = parse_metadata(meta["description"])
         X, F, patch, support = (arrays[key] for key in ("vertices", "faces", "patch_of_face", "support"))
-        about: dict[str, Any] = {
-            "curves": _curves(meta.get("curves", ()), len(X)),
-            "scalars": _under("scalar ", arrays),
-            "certificate": {**meta["certificate"], **_under("certificate ", arrays)},
-        }
-        return metadata.mesh_data(X, F, patch, list(metadata.patches), support=support, **about)
+        about: dict[str, Any] = {"support": support, "scalars": _under("scalar ", arrays)}
+        about["curves"] = _curves(meta.get("curves", ()), len(X))
+        about["certificate"] = {**meta["certificate"], **_under("certificate ", arrays)}
+        return metadata.mesh_data(X, F, patch, list(metadata.patches), **about)
 
 
 def _curves(rows: Any, n: int) -> tuple[HeldCurve, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
@@ -86,11 +87,9 @@ def _places(statements: Iterable[re.Match[str]]) -> Ints:
 
 def _vertices(file: TextSection) -> Floats:
     coordinates = VERTEX.findall(file.text)
-    try:
-        if len(coordinates) == len(re.findall(r"^[^\S\n]*v(?=\s)", file.text, re.M)):
+    if len(coordinates) == len(re.findall(r"^[^\S\n]*v(?=\s)", file.text, re.M)):
+        with suppress(ValueError):
             return parsed_numbers([c for row in coordinates for c in row]).reshape(-1, 3)
-    except ValueError:
-        pass
     for line in re.finditer(r"^[^\S\n]*v(?=\s)[^\n]*$", file.text, re.M):
         try:
             [parsed(c) for c in line[0].split()[1:4]][2]

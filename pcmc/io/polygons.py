@@ -70,8 +70,7 @@ def _best_fans(X: Floats, polygon: Ints, number: Ints) -> Ints:
     quality = triangle_quality(X, fans.reshape(-1, 3)).reshape(side.shape)
     worst = (side * quality).min(axis=2)
     best = worst.argmax(axis=0)
-    bad = np.flatnonzero(worst.max(axis=0) < 0.0)  # one without area becomes triangles without area
-    if len(bad):
+    if len(bad := np.flatnonzero(worst.max(axis=0) < 0.0)):  # those without area become such triangles
         at, text = int(number[bad[0]]), f"is a polygon of {k} corners that no fan of triangles fills; cut it"
         raise FileError(f"face {at} {text} {ELSEWHERE}", where=at, found=int(k))
     return fans[best, np.arange(len(polygon))]
@@ -94,7 +93,7 @@ def from_polygons(
         raise FileError("the file has no faces", where="faces", found=0)
     outside = (corners < 0) | (corners >= len(X)) | (corners != np.floor(corners))  # NaN differs from itself
     if outside.any():
-        bad = int(np.flatnonzero(outside)[0])
+        bad = int(outside.argmax())
         face = int(np.searchsorted(np.cumsum(counts), bad, side="right"))
         text = f"face {face} names vertex {corners[bad]}, which is outside 0..{len(X) - 1}"
         raise FileError(text, where=face)

@@ -150,8 +150,6 @@ class TextSection:
     def values(self, rest: Sequence[str], key: str, default: float = 0.0) -> tuple[Floats, Bools]:
         """(k,) the number after a key in what follows each element, and where there is one."""
         pattern = re.compile(rf"\b(?:{key})\s+\{{?([^\s{{}}]+)", re.I)
-        if not pattern.search("\n".join(set(rest))):
-            return np.full(len(rest), default), np.zeros(len(rest), dtype=bool)
         code, kinds, first = kinds_of(rest)
         value, given = np.full(len(kinds), default), np.zeros(len(kinds), dtype=bool)
         for k, words in enumerate(kinds):

@@ -54,11 +54,10 @@ def read(path: Path) -> MeshData:
             raise FileError(text, where=1 + data.count(b"\n", 0, match.start()), found=match[1][:60].decode())
     arrays = read_arrays("io/reading_scripts.py", "vtk_arrays", path)
     types, offsets, connected = (np.asarray(arrays[name]) for name in ("types", "offsets", "corners"))
-    solid = np.flatnonzero(types >= FIRST_SOLID)
-    if len(solid):
-        kind = int(types[solid[0]])
-        text = f"cell {solid[0]} is of VTK's type {kind}; pcmc reads triangles, quads and polygons"
-        raise FileError(text, where=int(solid[0]), found=kind)
+    if len(solid := np.flatnonzero(types >= FIRST_SOLID)):
+        at, kind = int(solid[0]), int(types[solid[0]])
+        text = f"cell {at} is of VTK's type {kind}; pcmc reads triangles, quads and polygons"
+        raise FileError(text, where=at, found=kind)
     if len(types):
         sound = len(offsets) == len(types) + 1 and offsets[0] == 0 and offsets[-1] <= len(connected)
         if not sound or (np.diff(offsets) < 0).any():

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..surface import Surface
-from ..surface.geometry import area_vectors, segment_lengths
+from ..surface.geometry import area_vectors, segment_lengths, vertex_sums
 from ..surface.held_curve import EdgesOnCurves
 from ..surface.topology import SIDES, edge_places
 from .quality import edge_lengths
@@ -55,16 +55,9 @@ def cut_curves(surface: Surface, along_curves: Floats, project: Projection | Non
         surface = refined_round(surface)
         counts = _pieces(surface, along_curves)
     stay, cable = _curve_edges(surface)
-    mesh = CurveMesh(
-        surface.vertices,
-        surface.faces,
-        surface.patch_of_face,
-        surface.topology.edges[stay],
-        surface.support_columns,
-        np.arange(surface.n),
-        cable[stay],
-        surface.edges_on_curves[stay],
-    )
+    curves, numbers = surface.topology.edges[stay], np.arange(surface.n)
+    about = curves, surface.support_columns, numbers, cable[stay], surface.edges_on_curves[stay]
+    mesh = CurveMesh(surface.vertices, surface.faces, surface.patch_of_face, *about)
     support = edge_columns(surface)[stay]
     while (counts > 1).any():
         mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
@@ -87,18 +80,15 @@ def _curve_edges(surface: Surface) -> tuple[Bools, Ints]:
 
 
 def refined_round(surface: Surface) -> Surface:
-    """1→4 with the new vertices off the curves on cubics that end square to the vertex normals.
-
-    With t the components of the edge b - a across the normals at its ends, the middle of the cubic is
-    (a + b)/2 + (t_a - t_b)/8.
-    """
+    """1→4 with the new vertices off the curves on cubics that end square to the vertex normals. With t the
+    components of the edge b - a across the normals at its ends, the middle of the cubic is (a + b)/2 + (t_a -
+    t_b)/8."""
     topo, n = surface.topology, surface.n
     chosen = np.flatnonzero(~_curve_edges(surface)[0])
     # the normals of each sheet at its vertices
     corner = surface.patch_of_face[:, None].astype(np.int64) * n + surface.faces
-    key, place = np.unique(corner.ravel(), return_inverse=True)
-    total = np.zeros((len(key), 3))
-    np.add.at(total, place, np.repeat(area_vectors(surface.vertices[surface.faces]), 3, axis=0))
+    key, place = np.unique(corner, return_inverse=True)
+    total = vertex_sums(area_vectors(surface.vertices[surface.faces]), place.reshape(-1, 3), len(key))
     total /= np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
     patch_of_edge = np.zeros(len(topo.edges), dtype=np.int64)
     patch_of_edge[topo.edge_of_face] = surface.patch_of_face[:, None]
@@ -106,10 +96,9 @@ def refined_round(surface: Surface) -> Surface:
     start, end = surface.vertices[topo.edges[chosen].T]
     edge = (end - start)[:, None]
     across = edge - (edge * normals).sum(axis=2, keepdims=True) * normals
-    rise = (across[:, 0] - across[:, 1]) / 8.0
+    rise, fine = (across[:, 0] - across[:, 1]) / 8.0, refine(surface)
     most = 0.2 * np.linalg.norm(edge[:, 0], axis=1)
     rise *= np.minimum(1.0, most / np.maximum(np.linalg.norm(rise, axis=1), 1e-300))[:, None]
-    fine = refine(surface)
     X = fine.vertices.copy()
     X[n + chosen] += rise
     return fine.moved(X)
@@ -127,36 +116,27 @@ def _cut_once(
 ) -> tuple[CurveMesh, Floats, Ints, Bools]:
     """Every curve edge that is to be cut, cut in two, with its triangles."""
     cut = counts > 1
-    ends, pieces = mesh.curves[cut], counts[cut]
-    first = pieces // 2
-    size_start, size_end = size[ends].T
+    ends, pieces, on = mesh.curves[cut], counts[cut], mesh.on[cut]
+    first, (size_start, size_end), (start, end) = pieces // 2, size[ends].T, mesh.X[ends.T]
     share = place_between(first / pieces, size_start, size_end)
-    start, end = mesh.X[ends[:, 0]], mesh.X[ends[:, 1]]
-    on = mesh.on[cut]
     at, points = on.between(share)
     points = np.where(on.drawn[:, None], points, start + share[:, None] * (end - start))
     number = len(mesh.X) + np.arange(len(ends))
-    F, patch = cut_triangles(mesh.F, mesh.patch, ends, number)
     halves = np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)
-    X = np.concatenate([mesh.X, points])
+    X, curves = np.concatenate([mesh.X, points]), np.concatenate([mesh.curves[~cut], *halves])
     size = np.concatenate([size, size_start + share * (size_end - size_start)])
-    curves = np.concatenate([mesh.curves[~cut], *halves])
-    at_vertices = np.concatenate([mesh.support, support[cut]])
-    cable = np.concatenate([mesh.cable[~cut], mesh.cable[cut], mesh.cable[cut]])
-    new = CurveMesh(X, F, patch, curves, at_vertices, np.arange(len(X)), cable, mesh.on.cut(cut, at))
-    counts = np.concatenate([counts[~cut], first, pieces - first])
-    return new, size, counts, np.concatenate([support[~cut], support[cut], support[cut]])
+    kept = np.concatenate([np.flatnonzero(~cut), np.flatnonzero(cut), np.flatnonzero(cut)])
+    about = curves, np.concatenate([mesh.support, support[cut]]), np.arange(len(X)), mesh.cable[kept]
+    new = CurveMesh(X, *cut_triangles(mesh.F, mesh.patch, ends, number), *about, mesh.on.cut(cut, at))
+    return new, size, np.concatenate([counts[~cut], first, pieces - first]), support[kept]
 
 
 def cut_triangles(
     F: Ints, patch: Ints, ends: Ints, number: Ints, first: Ints | None = None
 ) -> tuple[Ints, Ints]:
-    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four.
-
-    The edges ``ends`` (k,2) get the vertices ``number`` (k,). With two cut sides
-    a line leads to the middle of one of them from the corner opposite: of the side opposite corner
-    ``first`` (m,), where that is given.
-    """
+    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four. The edges
+    ``ends`` (k,2) get the vertices ``number`` (k,). With two cut sides a line leads to the middle of one of
+    them from the corner opposite: of the side opposite corner ``first`` (m,), where that is given."""
     place = edge_places(F[:, SIDES], ends)
     middle = np.where(place >= 0, number[place], -1)
     count = (middle >= 0).sum(axis=1)
@@ -204,9 +184,8 @@ def check_sizes(edge_length: npt.ArrayLike, n: int) -> Floats:
     if size.shape != (n,):
         message = f"edge_length: expected a number, or an array of shape ({n},), found shape {size.shape}"
         raise OptionError(message, what="edge_length", found=size.shape, expected=(n,))
-    wrong = np.flatnonzero(~(np.isfinite(size) & (size > 0.0)))
-    if len(wrong):
-        vertex, value, expected = int(wrong[0]), float(size[wrong[0]]), "a finite number > 0"
+    for vertex in np.flatnonzero(~(np.isfinite(size) & (size > 0.0))).tolist():
+        value, expected = float(size[vertex]), "a finite number > 0"
         message = f"edge_length of vertex {vertex}: expected {expected}, found {value}"
         raise OptionError(message, what="edge_length", where=vertex, found=value, expected=expected)
     return size
@@ -222,11 +201,9 @@ def limit_growth(X: Floats, edges: Ints, size: Floats, growth: float) -> Floats:
     [0.1, 0.6, 1.6]
     """
     n = len(X)
-    rise = (growth - 1.0) * segment_lengths(X, edges)
-    start = np.concatenate([edges[:, 0], np.full(n, n)])
-    end = np.concatenate([edges[:, 1], np.arange(n)])
-    weight = np.concatenate([rise, size])
-    graph: Any = coo_array((weight, (start, end)), shape=(n + 1, n + 1)).tocsr()
+    ends = np.concatenate([edges, np.column_stack([np.full(n, n), np.arange(n)])])
+    weight = np.concatenate([(growth - 1.0) * segment_lengths(X, edges), size])
+    graph: Any = coo_array((weight, (ends[:, 0], ends[:, 1])), shape=(n + 1, n + 1)).tocsr()
     return np.asarray(dijkstra(graph, directed=False, indices=[n])[0, :n])
 
 

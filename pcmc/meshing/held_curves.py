@@ -80,13 +80,11 @@ def doubted_midpoints(surface: Surface, corners: Ints | None = None) -> list[Flo
     share = np.divide(size, total, out=np.full_like(size, 0.5), where=total > 2.0 * size)
     share = two * np.copysign(share, heights[:, 0] - heights[:, 1])
     moves = share[:, None] * apart
-    change, both = np.zeros_like(X), np.zeros(len(X), dtype=bool)  # of s - r from a vertex on, over length²
+    change = np.full_like(X, np.nan)  # of s - r from a vertex on, over length²
     for end, sign in ((0, 1.0), (1, -1.0)):
         change[edges[two, end]] = sign * apart[two] / square[two, None]
-        both[edges[two, end]] = True
-    beside = edges[one, arcs[one].argmax(axis=1)]
-    guess = -0.5 * square[one, None] * change[beside]
-    moves[one] = np.where(both[beside, None], guess, -rises[one].sum(axis=1))
+    guess = -0.5 * square[one, None] * change[edges[one, arcs[one].argmax(axis=1)]]
+    moves[one] = np.where(np.isnan(guess), -rises[one].sum(axis=1), guess)
     places = _middles(X, edges, rises, arcs)
     known = np.empty(0, int) if corners is None else corners
     smooth = np.setdiff1d(_doubtful_corners(X, edges), known)
@@ -113,9 +111,8 @@ def onto_held_curves(surface: Surface, corners: Ints | None = None) -> Projectio
     X, edges = surface.vertices, held_edges(surface)
     corners = np.union1d(held_corners(surface), np.empty(0, int) if corners is None else corners)
     for _ in range(HALVINGS):
-        middle = _middles(X, edges, *_arcs_over(X, edges, CORNER, corners))
         number = len(X) + np.arange(len(edges))
-        X = np.concatenate([X, middle])
+        X = np.concatenate([X, _middles(X, edges, *_arcs_over(X, edges, CORNER, corners))])
         edges = np.concatenate([np.stack([edges[:, 0], number], 1), np.stack([number, edges[:, 1]], 1)])
     start, side = X[edges[:, 0]], X[edges[:, 1]] - X[edges[:, 0]]
     tree = cKDTree(start + 0.5 * side)
@@ -134,10 +131,8 @@ def onto_held_curves(surface: Surface, corners: Ints | None = None) -> Projectio
 
 
 def held_corners(surface: Surface) -> Ints:
-    """Vertices (k,) of held edges at which none of these goes on into another one.
-
-    On a finer mesh curves turn less at them. So that they stay corners there, keep their numbers.
-    """
+    """Vertices (k,) of held edges at which none of these goes on into another one. On a finer mesh curves
+    turn less at them. So that they stay corners there, keep their numbers."""
     edges = held_edges(surface)
     edge, end, *_ = _continuations(surface.vertices, edges, CORNER)
     return np.setdiff1d(edges, edges[edge, end])
@@ -150,11 +145,9 @@ def held_edges(surface: Surface) -> Ints:
 
 
 def _arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tuple[Floats, Bools]:
-    """The rises (e,2,3) of the arcs over held edges (e,2), and which of the two there are (e,2).
-
-    With a, b an edge's ends, c the next vertex of the curve beyond one, ℓ = |b - a|: the circle has the
-    curvature κ = 2 |(b - a) × (c - a)| / (ℓ |c - b| |a - c|), the arc the height (1 - √(1 - κ²ℓ²/4)) / κ.
-    """
+    """The rises (e,2,3) of the arcs over held edges (e,2), and which of the two there are (e,2). With a, b an
+    edge's ends, c the next vertex of the curve beyond one, ℓ = |b - a|: the circle has the curvature κ = 2
+    |(b - a) × (c - a)| / (ℓ |c - b| |a - c|), the arc the height (1 - √(1 - κ²ℓ²/4)) / κ."""
     rises, arcs = np.zeros((len(edges), 2, 3)), np.zeros((len(edges), 2), dtype=bool)
     edge, end, beyond, _ = _continuations(X, edges, corner)
     if corners is not None:
@@ -177,9 +170,8 @@ def _arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> t
 def _doubtful_corners(X: Floats, edges: Ints) -> Ints:
     """Vertices (k,) that are guessed to be corners, but may be on a smooth curve of long edges (e,2)."""
     edge, end, _, turn = _continuations(X, edges, COARSE)
-    turns, vertex = np.zeros((len(edges), 2)), edges[edge, end]
+    turns, vertex, beside = np.zeros((len(edges), 2)), edges[edge, end], np.full(len(X), np.inf)
     turns[edge, end] = turn
-    beside = np.full(len(X), np.inf)
     np.minimum.at(beside, vertex, turns[edge, 1 - end])
     return np.unique(vertex[(turn > CORNER) & (turn <= SHARPER * beside[vertex])])
 
@@ -191,9 +183,8 @@ def _middles(X: Floats, edges: Ints, rises: Floats, arcs: Bools) -> Floats:
 
 def _continuations(X: Floats, edges: Ints, corner: float) -> tuple[Ints, Ints, Ints, Floats]:
     """Edges (c,) that go on beyond an end, which end, the curve's next vertex there, its turn in degrees."""
-    vertex, other = edges.ravel(), edges[:, ::-1].ravel()
-    order = np.argsort(vertex, kind="stable")
-    vertex, other = vertex[order], other[order]
+    order = np.argsort(edges.ravel(), kind="stable")
+    vertex, other = edges.ravel()[order], edges[:, ::-1].ravel()[order]
     out = X[other] - X[vertex]
     length = np.linalg.norm(out, axis=1)
     out /= np.where(length > 0.0, length, 1.0)[:, None]

@@ -44,8 +44,7 @@ def surface_from_labels(
         labels the mesh is one patch, "surface".
     tension, pressure : of all patches, or a mapping from their names.
     boundary : the support of the boundary: "fixed", "sliding" on Π, or "free".
-    walls : tension of walls under the borders between patches (see ``add_walls``).
-    bottom : of those walls.
+    walls, bottom : tension of walls under the borders between patches, and their bottom; see ``add_walls``.
     plane : Π; z = 0 by default.
     weld : vertices nearer than this to each other are merged, length.
 
@@ -67,9 +66,7 @@ def surface_from_labels(
     if weld > 0.0:
         label = components(cKDTree(X).query_pairs(weld, output_type="ndarray"), len(X))
         F = np.unique(label, return_index=True)[1][label][F]
-    flat = (F[:, [1, 2, 0]] == F).any(axis=1)
-    if flat.any():
-        first = int(np.argmax(flat))
+    for first in np.flatnonzero((F[:, [1, 2, 0]] == F).any(axis=1))[:1].tolist():
         merged = f"when vertices nearer than weld={weld:g} are merged; use a smaller weld"
         raise SurfaceError(f"faces[{first}] vanishes {merged}", what="faces", where=first)
     used, F = np.unique(F, return_inverse=True)
@@ -103,9 +100,9 @@ def _by_name(value: Any, names: list[str], what: str) -> dict[str, float]:
     for name in value:
         if name not in names:
             raise OptionError(unknown("patch", name, names), what=what, found=name, expected=tuple(names))
-    missing = [name for name in names if name not in value]
-    if missing:
-        raise OptionError(f"{what}: no value for patch {missing[0]!r}", what=what, where=missing[0])
+    for name in names:
+        if name not in value:
+            raise OptionError(f"{what}: no value for patch {name!r}", what=what, where=name)
     return {name: float(value[name]) for name in names}
 
 
@@ -118,15 +115,12 @@ def _oriented(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Ints:
     same = edge[pairs[:, 0], 0] == edge[pairs[:, 1], 0]
     one, two = pairs.T // 3
     side = one_sided_copies(one, two, same, m)
-    both = np.flatnonzero(side[:m] == side[m:])
-    if len(both):
-        problem = f"the patch of face {both[0]} has only one side (like a Möbius strip)"
-        raise SurfaceError(f"{problem}; cut it into two patches", what="faces", where=int(both[0]))
+    for face in np.flatnonzero(side[:m] == side[m:])[:1].tolist():
+        problem = f"the patch of face {face} has only one side (like a Möbius strip)"
+        raise SurfaceError(f"{problem}; cut it into two patches", what="faces", where=face)
     part = np.minimum(side[:m], side[m:])
-    turned = side[:m] != part
-    corner = X[F] - X.mean(axis=0)
-    outward = area_vectors(corner) @ np.array(plane.normal)
-    if not topology(F, patch, n).boundary_edge.any():
-        outward = np.einsum("ij,ij->i", corner[:, 0], area_vectors(corner)) / 3.0
+    turned, corner = side[:m] != part, X[F] - X.mean(axis=0)
+    closed = not topology(F, patch, n).boundary_edge.any()
+    outward = (area_vectors(corner) * (corner[:, 0] if closed else plane.normal)).sum(axis=1)
     flip = turned ^ (np.bincount(part, np.where(turned, -outward, outward), 2 * m)[part] < 0.0)
     return np.where(flip[:, None], F[:, ::-1], F)

@@ -24,26 +24,18 @@ TALL = 4.0  # heights of a wall over the length of its top edge: a higher column
 
 
 def refine_near(
-    surface: Surface,
-    points: npt.ArrayLike,
-    levels: int,
-    radius: float,
-    project: Projection | None = None,
+    surface: Surface, points: npt.ArrayLike, levels: int, radius: float, project: Projection | None = None
 ) -> Surface:
     """The same surface with finer triangles near points: half the edge length at half the distance.
 
-    Level k of 1 … ``levels`` cuts all triangles within the distance r_k = radius 2^(1-k) of a point, as
-    ``refine_faces`` does. So the edges there get 2^-levels times as long, and each level adds about as many
-    triangles as the one before.
+    Level k of 1 … ``levels`` ≥ 0 cuts all triangles within the distance r_k = radius 2^(1-k), length, of a
+    point, as ``refine_faces`` does. So the edges there get 2^-levels times as long, and each level adds about
+    as many triangles as the one before. Vertex i keeps its number; patches, tensions and the plane stay.
 
     Parameters
     ----------
     points : (k,3) or (3,), length; vertices of the surface or other places.
-    levels : how often, ≥ 0.
-    radius : distance up to which the first level cuts triangles, length.
     project : as in ``refine``: puts new fixed vertices (k,3) on a curved boundary.
-
-    Vertex i keeps its number; patches, tensions and the plane stay.
 
     Raises
     ------

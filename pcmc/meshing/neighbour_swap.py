@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -19,12 +19,11 @@ from ..base.tolerances import ON
 from ..forces.functional import energy, patch_volumes
 from ..forces.rooms import prescribed_volumes
 from ..surface import Patch, Room, Surface
-from ..surface.geometry import area_vectors, edge_vectors, face_areas
+from ..surface.geometry import area_vectors, edge_vectors, face_areas, segment_lengths
 from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.supports import apply_supports
-from ..surface.topology import joined
-from .films import Film, film_of, lattice_steps
+from ..surface.topology import EdgeCurve, joined
 from .quality import in_the_middle, turns_over
 
 EDGE = 1.5  # of an equilateral triangle, over the square root of its area
@@ -32,6 +31,109 @@ WIDTH = 0.5  # of the edges of the triangles beside: how wide the new film is at
 WIDTHS = 0.5 * 1.25 ** np.arange(16)  # by which it is widened, of that
 VOLUME = 0.1  # of a room's own: by no more may that change it
 Triangle = tuple[Sequence[int], Sequence[Ints], int]  # vertices, steps and patch
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """A film between two junctions, with the patches A and B beside the one and C and D beside the other."""
+
+    patch: int
+    pairs: Ints  # (k,2) vertices of the one junction and of the other, across from each other and in order
+    closed: bool  # whether the last pair is joined to the first
+    one_side: tuple[int, int]  # A and C, on the same side of the film: these meet if it vanishes
+    other_side: tuple[int, int]  # B and D
+    width: float  # the mean distance of the pairs, length
+    height: float  # length of the shorter junction
+
+    @property
+    def sheets(self) -> tuple[int, ...]:
+        """A, C, B and D."""
+        return (*self.one_side, *self.other_side)
+
+    def meeting(self, surface: Surface, when: str) -> str:
+        """Names the patches that meet once the film has vanished: of a wall, the two of the roof at its ends.
+
+        >>> import numpy as np
+        >>> from pcmc import Patch
+        >>> floor = Surface(np.eye(3), [[0, 1, 2]], [0], [Patch("floor", 1.0)], fixed=range(3))
+        >>> Film(0, np.empty((0, 2)), False, (0, 0), (0, 0), 0.0, 1.0).meeting(floor, "then")
+        "'floor' and 'floor' then meet, and 'floor' and 'floor'"
+        """
+        name = [repr(patch.name) for patch in surface.patches]
+        (a, c), (b, d) = self.one_side, self.other_side
+        if surface.walls[self.patch]:
+            sheets = [curve.sheets for curve in surface.topology.junctions]
+            beside = [{k for own in sheets if s in own for k in own} for s in (a, b, c, d)]
+            ends = [{k for k in one & other if surface.roof[k]} for one, other in (beside[:2], beside[2:])]
+            if [len(end) for end in ends] == [1, 1]:
+                return f"{name[ends[0].pop()]} and {name[ends[1].pop()]} {when} meet"
+        return f"{name[a]} and {name[c]} {when} meet, and {name[b]} and {name[d]}"
+
+
+def film_of(surface: Surface, patch: int) -> Film | None:
+    """The strip that a patch is; None for one of another shape, or without four different patches beside it.
+    A film with further sides at junctions, such as a wall below a roof, is a strip across the short ones."""
+    topo, original = surface.topology, surface.original
+    curves = [curve for curve in topo.junctions if patch in curve.sheets]
+    edges = [topo.sides[topo.edge_numbers(curve.pairs)] for curve in curves]
+    lengths = [float(segment_lengths(surface.vertices, own).sum()) for own in edges]
+    ends = [set() if curve.closed else {int(v) for v in curve.vertices[[0, -1]]} for curve in curves]
+    found = list[tuple[float, int, int]]()
+    for i, j in combinations(range(len(curves)), 2):
+        one, other = curves[i], curves[j]
+        rest = [k for k in range(len(curves)) if k not in (i, j)]
+        around = {k for curve in (one, other) for k in curve.sheets} - {patch}
+        strip = (one.closed, len(one.sheets), len(other.sheets), len(around)) == (other.closed, 3, 3, 4)
+        strip = strip and all(len(ends[k] & ends[i]) == len(ends[k] & ends[j]) == 1 for k in rest)
+        if strip and surface.fixed[original[sorted(ends[i] & ends[j])]].all():
+            found.append((sum(lengths[k] for k in rest), i, j))
+    if not found:
+        return None
+    _, i, j = min(found)
+    one, other = curves[i], curves[j]
+    pairs, width = _across(surface, one, other)
+    (a, b), (c, d) = ([k for k in curve.sheets if k != patch] for curve in (one, other))
+    apart = _apart(surface, one, a, b)[pairs[:, 0]] * _apart(surface, other, c, d)[pairs[:, 1]]
+    c, d = (c, d) if apart.sum() > 0.0 else (d, c)
+    return Film(patch, pairs, one.closed, (a, c), (b, d), width, min(lengths[i], lengths[j]))
+
+
+def lattice_steps(lattice: Floats, vectors: Floats) -> Ints:
+    """(…,d) the whole multiples of the translations (d,3) of a lattice nearest to vectors (…,3)."""
+    return np.asarray(np.rint(vectors @ np.linalg.pinv(lattice)).astype(np.int64))
+
+
+def _across(surface: Surface, one: EdgeCurve, other: EdgeCurve) -> tuple[Ints, float]:
+    """(k,2) the vertices of two curves side by side, some of one several times; their mean distance."""
+    X, lattice, count = surface.vertices, lattice_of(surface), max(len(one.vertices), len(other.vertices))
+
+    def apart(row: Ints) -> Floats:
+        step = X[row[:, 1]] - X[row[:, 0]]
+        return np.asarray(np.linalg.norm(step - lattice_steps(lattice, step) @ lattice, axis=1))
+
+    rows = []
+    for way in (other.vertices, other.vertices[::-1]):
+        if one.closed:
+            start = np.broadcast_to(one.vertices[0], len(way))
+            way = np.roll(way, -int(apart(np.stack([start, way], axis=1)).argmin()))
+        row = list[Ints]()
+        for v in (one.vertices, way):
+            ends = np.rint(np.linspace(0, len(v) - 1, count)).astype(int)
+            row.append(v[np.arange(count) * len(v) // count if one.closed else ends])
+        rows.append(np.stack(row, axis=1))
+    pairs = min(rows, key=lambda row: float(apart(row).sum()))
+    return pairs, float(apart(pairs).mean())
+
+
+def _apart(surface: Surface, curve: EdgeCurve, one: int, other: int) -> Floats:
+    """(n,3) at the vertices of a junction the way across it from the one of two sheets to the other."""
+    topo, F, out = surface.topology, surface.faces, np.zeros((surface.n, 3))
+    f, k = np.nonzero(np.isin(topo.edge_of_face, topo.edge_numbers(curve.pairs)))
+    a, b, c = (surface.vertices[F[f, k - j]] for j in range(3))
+    sign = (surface.patch_of_face[f] == other).astype(float) - (surface.patch_of_face[f] == one)
+    for j in (1, 2):
+        np.add.at(out, surface.original[F[f, k - j]], sign[:, None] * (a - 0.5 * (b + c)))
+    return out
 
 
 def swap(surface: Surface, patch: str) -> Surface:
@@ -57,8 +159,7 @@ def swap(surface: Surface, patch: str) -> Surface:
     curve = curve[np.sort(np.unique(curve, return_index=True)[1])]
     edges = np.stack([curve, np.roll(curve, -1)], axis=1)[: None if film.closed else -1]
     edge = EDGE * float(np.sqrt(face_areas(mesh.corners(surface)[mesh.beside(film, edges)]).mean()))
-    way = _opening(surface, film, mesh, edges)
-    patches = list(surface.patches)
+    way, patches = _opening(surface, film, mesh, edges), list(surface.patches)
     if way is None:
         del patches[film.patch]
         mesh = replace(mesh, patch=mesh.patch - (mesh.patch > film.patch))
@@ -176,9 +277,8 @@ def _opening(surface: Surface, film: Film, mesh: _Mesh, edges: Ints) -> Floats |
     span = mesh.X[edges[:, 1]] - mesh.X[edges[:, 0]]
     span -= lattice_steps(lattice, span) @ lattice
     lengths = np.bincount(edges.ravel(), np.repeat(0.5 * np.linalg.norm(span, axis=1), 2), len(at))
-    strength = np.linalg.norm(new, axis=1)
-    most = max(strength[at].sum(), np.linalg.norm(old, axis=1)[at].sum())
-    if most <= surface.tensions[film.patch] * lengths[at].sum():
+    strength, other = np.linalg.norm([new, old], axis=2)
+    if max(strength[at].sum(), other[at].sum()) <= surface.tensions[film.patch] * lengths[at].sum():
         return None
     at &= strength > 0.0
     return np.where(at[:, None], new / np.where(at, strength, 1.0)[:, None], 0.0)
@@ -186,9 +286,7 @@ def _opening(surface: Surface, film: Film, mesh: _Mesh, edges: Ints) -> Floats |
 
 def _opened(film: Film, mesh: _Mesh, edges: Ints, half: Floats, columns: int) -> tuple[_Mesh, Floats]:
     """The mesh with a new film, of so many columns of triangles; how far its vertices are from its middle.
-
-    ``half`` (n,3) leads from the curve to the film's junction with A and C, and back to that with B and D.
-    """
+    ``half`` (n,3) leads from the curve to the film's junction with A and C, and back to that with B and D."""
     split, count = np.flatnonzero(half.any(axis=1)), len(mesh.X)
     across = np.repeat(np.arange(count)[:, None], columns + 1, axis=1)  # from A and C to B and D
     across[split, 1:] = count + np.arange(len(split) * columns).reshape(-1, columns)
@@ -207,30 +305,21 @@ def _opened(film: Film, mesh: _Mesh, edges: Ints, half: Floats, columns: int) ->
     vertices, steps, patch = (np.array(part) for part in zip(*new, strict=True))
     shares = 1.0 - 2.0 * np.arange(1, columns + 1) / columns
     parting = np.concatenate([half, (half[split, None] * shares[:, None]).reshape(-1, 3)])
-    opened = _Mesh(
-        np.concatenate([mesh.X, np.repeat(mesh.X[split], columns, axis=0)]) + parting,
-        np.concatenate([mesh.supports, np.repeat(mesh.supports[split], columns, axis=0)]),
-        np.concatenate([V, vertices]),
-        np.concatenate([mesh.steps, steps.reshape(len(new), *mesh.steps.shape[1:])]),
-        np.concatenate([mesh.patch, patch]),
-    )
-    return opened, parting
+    own = np.concatenate([np.arange(count), np.repeat(split, columns)])  # the vertex that each one was
+    corners = np.concatenate([mesh.steps, steps.reshape(len(new), *mesh.steps.shape[1:])])
+    triangles = np.concatenate([V, vertices]), corners, np.concatenate([mesh.patch, patch])
+    return _Mesh(mesh.X[own] + parting, mesh.supports[own], *triangles), parting
 
 
 def _parted(
     film: Film, mesh: _Mesh, vertex: int, across: Sequence[int], edges: Ints, V: Ints
 ) -> list[Triangle]:
-    """Gives the last vertex ``across`` to the other patches on the side of B and D, in V (m,3).
-
-    Where a patch lies between both sides, its fan is cut in its middle, and triangles fill the gap.
-    """
+    """Gives the last vertex ``across`` to the other patches on the side of B and D, in V (m,3). Where a patch
+    lies between both sides, its fan is cut in its middle, and triangles fill the gap."""
     rows = np.flatnonzero((mesh.vertices == vertex).any(axis=1))
-    sheet = mesh.patch[rows]
-    near, far = (
-        np.setdiff1d(mesh.vertices[rows[np.isin(sheet, side)]], edges)
-        for side in (film.one_side, film.other_side)
-    )
-    others = rows[~np.isin(sheet, film.sheets)]
+    of_sides = (rows[np.isin(mesh.patch[rows], side)] for side in (film.one_side, film.other_side))
+    near, far = (np.setdiff1d(mesh.vertices[beside], edges) for beside in of_sides)
+    others = rows[~np.isin(mesh.patch[rows], film.sheets)]
     corner = np.argmax(mesh.vertices[others] == vertex, axis=1)
     arcs = np.stack([mesh.vertices[others, (corner + k) % 3] for k in (1, 2)], axis=1)
     stop = np.bincount(arcs.ravel(), minlength=len(mesh.X)) != 2
@@ -293,9 +382,8 @@ def _rebuilt(
 
 def _widened(surface: Surface, parting: Floats) -> tuple[Surface, float]:
     """The surface with its new film as wide as lowers the energy most, all others following; how many times.
-
-    ``parting`` (n,3): the way of the film's vertices from its middle. Others go the mean way of those around.
-    """
+    ``parting`` (n,3): the way of the film's vertices from its middle. Others go the mean way of those
+    around."""
     known = parting.any(axis=1) | surface.fixed | (surface.original != np.arange(surface.n))
     way = in_the_middle(surface.original[surface.faces], known, parting)
     way = surface.spread(apply_supports(surface, way))

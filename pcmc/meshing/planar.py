@@ -12,7 +12,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import ON
-from ..surface.geometry import angles, bounding_size, cross_2d, file_origin, segment_lengths
+from ..surface.geometry import angles, bounding_size, cross_2d, file_origin, segment_lengths, vertex_sums
 from ..surface.topology import SIDES, components, edge_places
 from .quality import improve_angles
 
@@ -47,9 +47,7 @@ def triangulate(
 
     Parameters
     ----------
-    points : (k,2) required vertices.
-    segments : (s,2) int, required edges between them, which meet only at their ends.
-    edge_length : of the triangles, length.
+    points, segments : (k,2) required vertices; (s,2) required edges between them, which meet at ends alone.
     holes : a point (x, y) inside each region to leave out.
 
     Raises
@@ -63,14 +61,11 @@ def triangulate(
     >>> float(signed_areas(mesh.points, mesh.triangles).sum())
     3.0
     """
-    given = np.asarray(points, dtype=float)
+    given, segments = np.asarray(points, dtype=float), np.asarray(segments, dtype=np.int64)
     origin = file_origin(given, bounding_size(given))  # near it distances keep their digits
     fixed, inside_holes = given - origin, np.reshape(holes, (-1, 2)) - origin
-    segments = np.asarray(segments, dtype=np.int64)
     validate.positive("edge_length", edge_length)
-    near = cKDTree(fixed).query_pairs(1e-9 * edge_length)
-    if near:
-        i, j = min(near)
+    for i, j in sorted(cKDTree(fixed).query_pairs(1e-9 * edge_length))[:1]:
         problem = f"points {i} and {j} coincide at {given[i].tolist()}; merge them"
         raise SurfaceError(problem, what="points", where=(i, j))
     if len(segments) < 3:
@@ -88,10 +83,9 @@ def triangulate(
             if len(X) == len(mesh.points):
                 X = np.concatenate([X, _additions(mesh, segments, fixed, spacing, edge_length)])
         else:
-            area, moment, weight = np.abs(signed_areas(X, T)), np.zeros_like(X), np.zeros(len(X))
-            np.add.at(moment, T.ravel(), np.repeat(area[:, None] * X[T].mean(axis=1), 3, axis=0))
-            np.add.at(weight, T.ravel(), np.repeat(area, 3))
-            X = np.concatenate([fixed, moment[len(fixed) :] / weight[len(fixed) :, None]])
+            area = np.abs(signed_areas(X, T))[:, None]
+            sums = vertex_sums(np.hstack([area * X[T].mean(axis=1), area]), T, len(X))[len(fixed) :]
+            X = np.concatenate([fixed, sums[:, :2] / sums[:, 2:]])
         mesh = _inside(X, segments, inside_holes, len(fixed), origin)
     movable = np.arange(len(mesh.points)) >= len(fixed)
     flat = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
@@ -111,13 +105,11 @@ def locate(mesh: PlanarMesh, points: Floats) -> Ints:
     if not len(points):
         return triangle
     corner = mesh.points[mesh.triangles]
-    side = corner[:, [1, 2, 0]] - corner
-    slack = 1e-12 * np.einsum("tij,tij->t", side, side).max(initial=0.0)
-    order = np.argsort(points[:, 0])
-    x = corner[..., 0]  # only the triangles above and below a point are tried
-    low, high = x.min(axis=1) - ON * np.ptp(x), x.max(axis=1) + ON * np.ptp(x)
-    first = np.searchsorted(points[order, 0], low)
-    count = np.searchsorted(points[order, 0], high, side="right") - first
+    side, x = corner[:, [1, 2, 0]] - corner, corner[..., 0]
+    slack, order = 1e-12 * np.einsum("tij,tij->t", side, side).max(initial=0.0), np.argsort(points[:, 0])
+    # only the triangles above and below a point are tried
+    first = np.searchsorted(points[order, 0], x.min(axis=1) - ON * np.ptp(x))
+    count = np.searchsorted(points[order, 0], x.max(axis=1) + ON * np.ptp(x), side="right") - first
     tried = np.repeat(np.arange(len(corner)), count)
     place = order[np.arange(len(tried)) + np.repeat(first - np.cumsum(count) + count, count)]
     hit = (cross_2d(side[tried], points[place][:, None] - corner[tried]) >= -slack).all(axis=1)
@@ -137,21 +129,16 @@ def _lattice(points: Floats, segments: Ints, h: float) -> Floats:
 
 def _clear(candidates: Floats, points: Floats, segments: Ints, clearance: Floats) -> Bools:
     """(p,) whether candidates (p,2) are far enough from the given points and segments."""
-    if not len(candidates):
-        return np.zeros(0, dtype=bool)
-    start, end = segments.T
-    midpoints = 0.5 * (points[start] + points[end])
-    reach = np.concatenate([clearance, np.minimum(clearance[start], clearance[end])])
-    distance, nearest = cKDTree(np.concatenate([points, midpoints])).query(candidates)
-    return distance >= CLEARANCE * reach[nearest]
+    reach = np.concatenate([clearance, clearance[segments].min(axis=1)])
+    places = np.concatenate([points, points[segments].mean(axis=1)])
+    distance, nearest = cKDTree(places).query(candidates.reshape(-1, 2))
+    return np.asarray(distance >= CLEARANCE * reach[nearest])
 
 
 def _inside(points: Floats, segments: Ints, holes: Floats, k: int, origin: Floats) -> PlanarMesh:
     """The Delaunay triangulation with every segment an edge, inside the outline and outside the holes; points
-    used elsewhere only go.
-
-    Segments separate the parts of it; a part with a side that no other triangle has is outside.
-    """
+    used elsewhere only go. Segments separate the parts of it; a part with a side that no other triangle has
+    is outside."""
     try:
         T: Ints = Delaunay(points).simplices.astype(np.int64)
     except QhullError:
@@ -176,10 +163,9 @@ def _inside(points: Floats, segments: Ints, holes: Floats, k: int, origin: Float
     kept = ~np.isin(part, [*outer, *part[located]])
     if not kept.any():
         raise SurfaceError("the segments enclose no area; close the outline", what="segments")
-    used = np.zeros(len(points), dtype=bool)
-    used[T[kept]] = used[:k] = True
+    used = np.union1d(np.arange(k), T[kept])
     region = np.unique(part[kept], return_inverse=True)[1]
-    return PlanarMesh(points[used], (np.cumsum(used) - 1)[T[kept]], region)
+    return PlanarMesh(points[used], np.searchsorted(used, T[kept]), region)
 
 
 def twins(key: Ints) -> Ints:
@@ -196,22 +182,16 @@ def _crossing(X: Floats, a: int, b: int) -> SurfaceError:
 
 def _with_segment(X: Floats, T: Ints, a: int, b: int, origin: Floats) -> Ints:
     """The triangulation with edge (a, b); the triangles that it crosses are replaced (Anglada, 1997)."""
-    E = T[:, SIDES]
+    E, along = T[:, SIDES], X[b] - X[a]
     u, v = X[E[..., 0]], X[E[..., 1]]
-    foreign = ~np.isin(E, [a, b]).any(axis=2)
-    along = X[b] - X[a]
-    crossed = (
-        (cross_2d(along, u - X[a]) * cross_2d(along, v - X[a]) < 0)
-        & (cross_2d(v - u, X[a] - u) * cross_2d(v - u, X[b] - u) < 0)
-        & foreign
-    ).any(axis=1)
-    cavity = E[crossed].reshape(-1, 2)
-    twin = {(int(p), int(q)) for p, q in cavity}
-    follow = {p: q for p, q in twin if (q, p) not in twin}
+    apart = cross_2d(along, u - X[a]) * cross_2d(along, v - X[a]) < 0
+    apart &= cross_2d(v - u, X[a] - u) * cross_2d(v - u, X[b] - u) < 0
+    crossed = (apart & ~np.isin(E, [a, b]).any(axis=2)).any(axis=1)
+    cavity = set(map(tuple, E[crossed].reshape(-1, 2).tolist()))
+    follow: dict[int, int] = {p: q for p, q in cavity if (q, p) not in cavity}
     new: list[tuple[int, int, int]] = []
     for start, end in ((b, a), (a, b)):  # each side's rim, counter-clockwise, without its ends
-        rim: list[int] = []
-        at = follow.get(start)
+        rim, at = list[int](), follow.get(start)
         while at is not None and at != end and len(rim) <= len(follow):
             rim.append(at)
             at = follow.get(at)
@@ -222,10 +202,8 @@ def _with_segment(X: Floats, T: Ints, a: int, b: int, origin: Floats) -> Ints:
 
 
 def _delaunay_below(X: Floats, a: int, b: int, rim: list[int]) -> list[tuple[int, int, int]]:
-    """Delaunay triangles between edge (a, b) and the vertices of the rim to its left, a to b.
-
-    The apex over (a, b) is the vertex that sees it under the largest angle: its circle is empty.
-    """
+    """Delaunay triangles between edge (a, b) and the vertices of the rim to its left, a to b. The apex over
+    (a, b) is the vertex that sees it under the largest angle: its circle is empty."""
     if not rim:
         return []
     u, v = X[a] - X[rim], X[b] - X[rim]
@@ -244,10 +222,9 @@ def _wanted(points: Floats, fixed: Floats, spacing: Floats, h: float) -> Floats:
 def _additions(mesh: PlanarMesh, segments: Ints, fixed: Floats, spacing: Floats, h: float) -> Floats:
     """(p,2) circumcentres of triangles that are too large or too sharp, apart from each other."""
     X, T = mesh.points, mesh.triangles
-    a, b, c = (X[T[:, i]] for i in range(3))
-    u, v = b - a, c - a
-    twice = 2.0 * cross_2d(u, v)
-    uu, vv = (u**2).sum(axis=1), (v**2).sum(axis=1)
+    a = X[T[:, 0]]
+    u, v = X[T[:, 1]] - a, X[T[:, 2]] - a
+    twice, uu, vv = 2.0 * cross_2d(u, v), (u**2).sum(axis=1), (v**2).sum(axis=1)
     offset = np.stack([v[:, 1] * uu - u[:, 1] * vv, u[:, 0] * vv - v[:, 0] * uu], axis=1)
     flat = np.abs(twice) <= 1e-12 * (uu + vv)
     centre = a + offset / np.where(flat, 1.0, twice)[:, None]
@@ -257,21 +234,17 @@ def _additions(mesh: PlanarMesh, segments: Ints, fixed: Floats, spacing: Floats,
     chosen = np.flatnonzero(~flat & ((radius > wanted) | (sharp & (radius > 0.8 * wanted))))
     order = chosen[np.argsort(-radius[chosen] / wanted[chosen], kind="stable")]
     place, need = centre[order], 0.7 * wanted[order]
-    clear = cKDTree(X).query(place)[0] >= need if len(place) else np.zeros(0, dtype=bool)
-    clear &= _clear(place, fixed, segments, spacing)
+    clear = (cKDTree(X).query(place)[0] >= need) & _clear(place, fixed, segments, spacing)
     return place[clear][_spaced_out(place[clear], need[clear])]
 
 
 def _spaced_out(points: Floats, need: Floats, given: int = 0) -> Bools:
-    """(p,) a choice of points, earlier ones first: pairs are not nearer than both points need.
-
-    The first ``given`` points are always chosen.
-    """
+    """(p,) a choice of points, earlier ones first: pairs are not nearer than both points need. The first
+    ``given`` points are always chosen."""
     chosen = np.ones(len(points), dtype=bool)
     if len(points) > 1:
         pairs = cKDTree(points).query_pairs(float(need.max()), output_type="ndarray")
-        distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
-        close = pairs[distance < need[pairs].min(axis=1)]
+        close = pairs[segment_lengths(points, pairs) < need[pairs].min(axis=1)]
         for i, j in close[np.lexsort(close.T[::-1])]:
             if chosen[i] and j >= given:
                 chosen[j] = False

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from ..base.arrays import Bools, Floats, Ints
-from ..base.compiled import compiled, inlined
+from ..base.compiled import compiled
 from ..forces.motion_space import motion_space
 from ..forces.pinching import StandingPart
 from ..surface import Surface
@@ -39,14 +39,6 @@ TURNS = 2.0 * np.pi * np.arange(8) / 8.0
 REACHES = (0.02, 0.06, 0.15)  # of the longest edge of the star
 
 
-@inlined
-def _area_and_edges(X: Floats, F: Ints, f: int) -> tuple[float, float]:
-    """4√3 area and Σ edge² of triangle f."""
-    a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
-    u, w = sub(b, a), sub(c, a)
-    return norm(cross(u, w)) * 2.0 * SQRT3, 2.0 * (dot(u, u) + dot(w, w) - dot(u, w))
-
-
 @compiled
 def triangle_quality(X: Floats, F: Ints) -> Floats:
     """q = 4√3 area / Σ edge² (m,), 1 for an equilateral triangle, 0 for a degenerate one.
@@ -56,21 +48,17 @@ def triangle_quality(X: Floats, F: Ints) -> Floats:
     """
     out = np.zeros(len(F))
     for f in range(len(F)):
-        area, squared_edges = _area_and_edges(X, F, f)
+        a, b, c = point(X, F[f, 0]), point(X, F[f, 1]), point(X, F[f, 2])
+        u, w = sub(b, a), sub(c, a)
+        squared_edges = 2.0 * (dot(u, u) + dot(w, w) - dot(u, w))
         if squared_edges != 0.0:
-            out[f] = area / squared_edges
+            out[f] = norm(cross(u, w)) * 2.0 * SQRT3 / squared_edges
     return out
 
 
-@compiled
 def worst_quality(X: Floats, F: Ints) -> float:
     """The smallest triangle quality, 1 where there are no triangles."""
-    worst = 1.0
-    for f in range(len(F)):
-        area, squared_edges = _area_and_edges(X, F, f)
-        if area < worst * squared_edges or squared_edges == 0.0:
-            worst = area / squared_edges if squared_edges > 0.0 else 0.0
-    return worst
+    return float(triangle_quality(X, F).min(initial=1.0))
 
 
 @compiled
@@ -96,15 +84,13 @@ def edge_lengths(surface: Surface) -> Floats:
 
 
 def towards_star_centres(surface: Surface, X: Floats, kind: Ints, curve: Ints, beside: Ints) -> Floats:
-    """Move (n,3) of each vertex halfway towards a better-shaped star, before any projection.
-
-    Inside a sheet (``kind`` (n,)) towards the area-weighted mean of its triangles' centroids, at the
-    vertices ``curve`` (c,) towards the middle of their neighbours ``beside`` (c,2), elsewhere not at
-    all; fixed vertices stay and sliding ones keep to Π.
-    """
+    """Move (n,3) of each vertex halfway towards a better-shaped star, before any projection. Inside a sheet
+    (``kind`` (n,)) towards the area-weighted mean of its triangles' centroids, at the vertices ``curve`` (c,)
+    towards the middle of their neighbours ``beside`` (c,2), elsewhere not at all; fixed vertices stay and
+    sliding ones keep to Π."""
     move = _to_star_centres(X, surface.faces)
     move[kind != SHEET] = 0.0
-    move[curve] = 0.5 * (X[beside[:, 0]] + X[beside[:, 1]]) - X[curve]
+    move[curve] = X[beside].mean(axis=1) - X[curve]
     return apply_supports(surface, 0.5 * move, X)
 
 
@@ -126,13 +112,11 @@ def _to_star_centres(X: Floats, F: Ints) -> Floats:
 
 
 def redistribute(part: StandingPart, X: Floats, aim: float, *, slide: bool) -> tuple[Floats, float]:
-    """The best of a few sweeps of redistribution, (n,3), and the quality of its worst triangle.
-
-    Sweeps end where that is at least ``aim``; triangles of walls that can pinch do not count. Each vertex
-    moves from X (n,3) towards the middle of its star, without the part in the motion space, which would
-    change the shape; walls follow their crest. With ``slide``, junction vertices at rest on Π slide too.
-    Junctions that can come down on a held bottom stay over the vertices of that.
-    """
+    """The best of a few sweeps of redistribution, (n,3), and the quality of its worst triangle. Sweeps end
+    where that is at least ``aim``; triangles of walls that can pinch do not count. Each vertex moves from X
+    (n,3) towards the middle of its star, without the part in the motion space, which would change the shape;
+    walls follow their crest. With ``slide``, junction vertices at rest on Π slide too. Junctions that can
+    come down on a held bottom stay over the vertices of that."""
     surface, classes, faces = part.surface, part.classes, part.quality_faces
     best, worst = X, worst_quality(X, faces)
     for _ in range(SWEEPS):
@@ -173,10 +157,8 @@ def improve_angles(X: Floats, F: Ints, movable: Bools, goal: float) -> Floats:
         bad = np.flatnonzero(smallest < goal)
         vertices = F[bad[np.argsort(smallest[bad], kind="stable")]].ravel()
         vertices = vertices[np.sort(np.unique(vertices, return_index=True)[1])]
-        moved = [
-            _improve(X, F[order[first[v] : first[v + 1]] // 3], int(v))
-            for v in vertices[movable[vertices]][:MOST]
-        ]
+        chosen = vertices[movable[vertices]][:MOST].tolist()
+        moved = [_improve(X, F[order[first[v] : first[v + 1]] // 3], v) for v in chosen]
         if not any(moved):
             break
     return X
@@ -191,9 +173,10 @@ def _improve(X: Floats, star: Ints, v: int) -> bool:
     length = np.linalg.norm(first)
     if not length > 0.0:
         return False
-    second = np.cross(normal / np.linalg.norm(normal), first / length)
+    first /= length
+    second = np.cross(normal / np.linalg.norm(normal), first)
     reach = np.linalg.norm(corner - X[v], axis=2).max()
-    around = np.cos(TURNS)[:, None] * (first / length) + np.sin(TURNS)[:, None] * second
+    around = np.cos(TURNS)[:, None] * first + np.sin(TURNS)[:, None] * second
     places = X[v] + np.concatenate([np.zeros((1, 3)), *(reach * r * around for r in REACHES)])
     ring = np.where((star == v)[None, :, :, None], places[:, None, None, :], corner[None])
     upright = area_vectors(ring) @ normal > 0.0

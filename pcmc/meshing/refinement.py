@@ -49,7 +49,6 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
 
     Parameters
     ----------
-    levels : how often, ≥ 0.
     project : (k,3) → (k,3), applied to the new fixed vertices on no curve at each level: puts them on a
         curved boundary that the edges only approximate.
 
@@ -67,26 +66,23 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     """
     expect_surface(surface)
     for _ in range(refinable(levels, surface.m)):
-        if surface.periodic:
-            surface = _refined_cell(surface, project)
-            continue
-        a, b, c = surface.faces.T
-        bc, ca, ab = surface.n + surface.topology.edge_of_face.T  # an edge's number is opposite its corner
+        cell = surface.cell
+        a, b, c = cell.faces.T
+        bc, ca, ab = cell.n + cell.topology.edge_of_face.T  # an edge's number is opposite its corner
         F = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3)
-        every = np.ones(len(surface.topology.edges), dtype=bool)
-        surface = with_vertices_on(surface, every, F, np.repeat(surface.patch_of_face, 4), project)
+        every = np.ones(len(cell.topology.edges), dtype=bool)
+        fine = with_vertices_on(cell, every, F, np.repeat(cell.patch_of_face, 4), project)
+        surface = _refined_cell(surface, fine) if surface.periodic else fine
     return surface
 
 
-def _refined_cell(surface: Surface, project: Projection | None) -> Surface:
+def _refined_cell(surface: Surface, fine: Surface) -> Surface:
     """One refinement of a periodic surface: where edges are images of each other, so are their midpoints."""
-    topo, edges = surface.topology, surface.cell.topology.edges
-    number, k = topo.edge_numbers(surface.original[edges]), np.arange(len(edges))
+    edges = surface.cell.topology.edges
+    number, k = surface.topology.edge_numbers(surface.original[edges]), np.arange(len(edges))
     columns = np.concatenate([surface.support_columns, edge_columns(surface)[number]])
     vertex = np.unique(number, return_index=True)[1][number]
-    midpoints = surface.n + np.stack([k, vertex], axis=1)[vertex != k]
-    fine = refine(surface.cell, 1, project)
-    images = np.concatenate([surface.images, midpoints])
+    images = np.concatenate([surface.images, surface.n + np.stack([k, vertex], axis=1)[vertex != k]])
     return fine.with_mesh(columns, images=images, rooms=surface.rooms)
 
 
@@ -122,8 +118,7 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     topo, (fixed, sliding) = surface.topology, surface.given_supports.fixed_and_sliding()
     start, end = topo.edges.T
     boundary = topo.boundary_edge
-    crossing = topo.on_boundary[start] & topo.on_boundary[end]
-    inner = (topo.junction_edge | topo.seam_edge) & ~crossing
+    inner = (topo.junction_edge | topo.seam_edge) & ~topo.on_boundary[topo.edges].all(axis=1)
     drawn, known = surface.edges_on_curves.drawn, np.zeros(surface.n, dtype=bool)
     known[topo.edges[drawn]] = True
     inside = ~(topo.on_boundary | known)[topo.edges].any(axis=1) & ~boundary & ~inner
@@ -133,12 +128,9 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     both_fixed = drawn | (fixed[start] & fixed[end] & (boundary | inner | inside))
     # lines of held edges inside a patch go on to the boundary by the edge along which they turn least
     inside &= both_fixed
-    X = surface.vertices
-    ends = np.bincount(topo.edges[inside].ravel(), minlength=surface.n) == 1
-    before = np.zeros(surface.n, dtype=np.int64)
-    line = np.concatenate([topo.edges[inside], topo.edges[inside][:, ::-1]])
-    before[line[:, 0]] = line[:, 1]
-    rim = topo.on_boundary & fixed
+    X, line, before = surface.vertices, topo.edges[inside], np.zeros(surface.n, dtype=np.int64)
+    ends = np.bincount(line.ravel(), minlength=surface.n) == 1
+    before[line], rim = line[:, ::-1], topo.on_boundary & fixed
     number = np.flatnonzero((ends[topo.edges] & rim[topo.edges][:, ::-1]).any(axis=1))
     here, there = np.where(ends[topo.edges[number, :1]], topo.edges[number], topo.edges[number][:, ::-1]).T
     along, on = X[here] - X[before[here]], X[there] - X[here]
@@ -154,10 +146,8 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
 
 
 def edge_columns(surface: Surface) -> Bools:
-    """(e,c) the supports of the new vertices on edges, as in ``Surface.support_columns``.
-
-    A new vertex slides along a line or circle if both ends of its edge lie on it, and one of them slides.
-    """
+    """(e,c) the supports of the new vertices on edges, as in ``Surface.support_columns``. A new vertex slides
+    along a line or circle if both ends of its edge lie on it, and one of them slides."""
     columns, edges = [*held_midpoints(surface), *edges_on_planes(surface)], surface.topology.edges
     for guide, along in surface.given_supports.on_line:
         on = surface.fixed & (guide.distance(surface.vertices) <= ON * surface.size)
@@ -174,8 +164,7 @@ def onto_circles_of(surface: Surface, columns: Bools, points: Floats) -> None:
 
 def edges_on_planes(surface: Surface) -> list[Bools]:
     """For each of ``on_planes`` the (e,) edges whose new vertices slide on it."""
-    topo = surface.topology
-    masks = []
+    topo, masks = surface.topology, list[Bools]()
     for plane, mask in surface.on_planes:
         along = mask[topo.edges].all(axis=1) & (topo.curve_edge if plane.mirror else topo.boundary_edge)
         along[topo.edge_of_face[mask[surface.faces].all(axis=1)]] = True
@@ -207,8 +196,7 @@ def with_vertices_on(
     new[drawn] = points[drawn]
     if surface.order == 1:
         _rest_on_bottoms(surface, cut, new)
-    number = surface.n + np.arange(len(new))
-    curves: tuple[HeldCurve, ...] = ()
+    number, curves = surface.n + np.arange(len(new)), tuple[HeldCurve, ...]()
     if surface.held_curves:
         halves = (np.stack([ends[:, 0], number], axis=1), np.stack([number, ends[:, 1]], axis=1))
         curves = on.cut(cut, at).joined(np.concatenate([surface.topology.edges[~cut], *halves]))
@@ -223,46 +211,34 @@ def with_vertices_on(
 
 
 def midpoints(surface: Surface, edges: Ints) -> Floats:
-    """(k,3) the middles of edges (k,2), for a finer mesh.
-
-    A wall's edge may lead from a resting junction to a standing vertex. Its middle is placed in its row
-    below the middle of the top edge: rows that coincide where the junction rests part again beside it.
-    """
-    start, end = edges.T
-    X, topo = surface.vertices, surface.topology
+    """(k,3) the middles of edges (k,2), for a finer mesh. A wall's edge may lead from a resting junction to a
+    standing vertex. Its middle is placed in its row below the middle of the top edge: rows that coincide
+    where the junction rests part again beside it."""
+    (start, end), X, topo = edges.T, surface.vertices, surface.topology
     if surface.order > 1:
         on_edges = np.empty((len(topo.edges), 3))
         on_edges[topo.edge_of_face] = middles_of_sides(X, surface.nodes, surface.order)
         return np.asarray(on_edges[topo.edge_numbers(edges)])
-    middle = 0.5 * (X[start] + X[end])
-    part = standing_part(surface)
+    middle, part = 0.5 * (X[start] + X[end]), standing_part(surface)
     walls, rows, resting = part.walls, part.walls.rows, part.resting
     if not resting.any():
         return middle
-    top, share, offset = X.copy(), np.zeros((surface.n, 1)), np.zeros_like(X)
-    top[rows.vertices], share[rows.vertices, 0] = rows.top_places(X), 1.0 - rows.relative_height
-    offset[rows.vertices] = rows.offset
-    drop = X - surface.plane.nearest(X)
+    own, top, share, offset = rows.vertices, X.copy(), np.zeros((surface.n, 1)), np.zeros_like(X)
+    drop, down, of_wall = X - surface.plane.nearest(X), resting.copy(), resting | walls.top_free
     drop[walls.held] = X[walls.held] - X[walls.foot[walls.held]]
-    drop[rows.vertices] = rows.drops(surface, X)
-    down = resting.copy()
-    down[rows.vertices] = under_low(rows, resting | walls.corner)
-    of_wall = resting | walls.top_free
-    of_wall[rows.vertices] = True
+    top[own], drop[own] = rows.top_places(X), rows.drops(surface, X)
+    share[own, 0] = 1.0 - rows.relative_height
+    offset[own], of_wall[own], down[own] = rows.offset, True, under_low(rows, resting | walls.corner)
     rising = of_wall[start] & of_wall[end] & (down[start] != down[end])
     rising &= ~(surface.fixed[start] & surface.fixed[end])
-    top, share, offset, drop = (
-        0.5 * values[edges[rising]].sum(axis=1) for values in (top, share, offset, drop)
-    )
+    top, share, offset, drop = (v[edges[rising]].mean(axis=1) for v in (top, share, offset, drop))
     middle[rising] = top - share * drop + np.linalg.norm(drop, axis=1)[:, None] * offset
     return middle
 
 
 def _rest_on_bottoms(surface: Surface, cut: Bools, new: Floats) -> None:
-    """Move new points (k,3) of a wall as those of its held bottom were moved, where it rests, in place.
-
-    A curved bottom has new points beside the middles of its edges; what does not lie on it does not rest.
-    """
+    """Move new points (k,3) of a wall as those of its held bottom were moved, where it rests, in place. A
+    curved bottom has new points beside the middles of its edges; what does not lie on it does not rest."""
     part, topo = standing_part(surface), surface.topology
     rows, foot = part.walls.rows, part.walls.foot.copy()
     down = (part.resting | part.walls.corner) & (foot >= 0)
@@ -272,10 +248,9 @@ def _rest_on_bottoms(surface: Surface, cut: Bools, new: Floats) -> None:
     down[rows.vertices] = under_low(rows, down) & (rows.feet[:, 0] >= 0)
     foot[rows.vertices] = np.where(rows.fraction == 0.0, *rows.feet.T)
     foot[bottoms], down[bottoms] = bottoms, True
-    moved = new - 0.5 * surface.vertices[topo.edges[cut]].sum(axis=1)
-    number = np.full(len(cut) + 1, -1)
+    ends, number = topo.edges[cut], np.full(len(cut) + 1, -1)
     number[np.flatnonzero(cut)] = np.arange(len(new))
-    ends = topo.edges[cut]
+    moved = new - surface.vertices[ends].mean(axis=1)
     follows = (foot[ends] >= 0).all(axis=1) & down[ends].any(axis=1) & ~surface.fixed[ends].all(axis=1)
     below = np.where(follows, number[topo.edge_numbers(foot[ends])], -1)
     new[below >= 0] += moved[below[below >= 0]]

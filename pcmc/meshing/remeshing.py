@@ -86,9 +86,8 @@ def remesh(
     expect_flat(surface, "remesh")
     one: Any = edge_length if np.ndim(edge_length) == 0 else 1.0
     check_lengths(one, near_curves, growth, chord)
-    if np.ndim(edge_length) == 0:
-        size = np.full(surface.n, edge_length, dtype=float)
-    else:
+    size = np.full(surface.n, one, dtype=float)
+    if np.ndim(edge_length):
         size = check_sizes(edge_length, surface.n)
         size = limit_growth(surface.vertices, surface.topology.edges, size, growth)
     along_curves = size if near_curves is None else np.minimum(size, near_curves)
@@ -141,27 +140,22 @@ def _refuse_too_many(surface: Surface, size: Floats, name: str) -> None:
     count = triangles_for(face_areas(surface.vertices[surface.faces]), size[surface.faces].mean(axis=1)).sum()
     if count <= MOST:
         return
-    found = float(size.min())
-    least = two_digits(found * math.sqrt(count / MOST), math.ceil)
-    message = f"remesh: {name} = {found:g} would make about {count:.2g} triangles, more than {MOST}"
-    raise OptionError(f"{message}; use {least:g} or more", what=name, found=found, expected=least)
+    least = two_digits(float(size.min()) * math.sqrt(count / MOST), math.ceil)
+    message = f"remesh: {name} = {size.min():g} would make about {count:.2g} triangles, more than {MOST}"
+    raise OptionError(f"{message}; use {least:g} or more", what=name, found=float(size.min()), expected=least)
 
 
 def _refuse_flat_chord(surface: Surface, chord: float, size: float) -> None:
-    """Refuse a chord that the shortest edges exceed by far: MMG would take long, and give up.
-
-    An equilateral triangle of edge e is up to H e² / 6 away from a sphere of mean curvature H.
-    """
+    """Refuse a chord that the shortest edges exceed by far: MMG would take long, and give up. An equilateral
+    triangle of edge e is up to H e² / 6 away from a sphere of mean curvature H."""
     curvature = np.abs(mean_curvature(surface, "cotangent"))
     known = curvature[np.isfinite(curvature)]
-    curved = float(known.mean()) if len(known) else 0.0
-    reached = curved * (SHORTEST * size) ** 2 / 6.0
-    if reached <= BEYOND * chord:
-        return
-    least = two_digits(reached / BEYOND, math.ceil)
-    message = f"remesh: chord = {chord:g} is out of reach of an edge length of {size:g}"
-    message += f"; use {least:g} or more, or a smaller edge length"
-    raise OptionError(message, what="chord", found=chord, expected=least)
+    reached = (float(known.mean()) if len(known) else 0.0) * (SHORTEST * size) ** 2 / 6.0
+    if reached > BEYOND * chord:
+        least = two_digits(reached / BEYOND, math.ceil)
+        message = f"remesh: chord = {chord:g} is out of reach of an edge length of {size:g}"
+        message += f"; use {least:g} or more, or a smaller edge length"
+        raise OptionError(message, what="chord", found=chord, expected=least)
 
 
 def _sizes(mesh: CurveMesh, size: Floats, growth: float) -> Floats:
@@ -182,8 +176,7 @@ def _remesh_with_mmg(mesh: CurveMesh, size: Floats, growth: float, chord: float)
         from mmgpy import MmgMeshS
     except ImportError:
         raise MissingExtra("mmgpy", "remesh") from None
-    held = np.flatnonzero(mesh.support.any(axis=1))
-    fixed = np.unique(np.concatenate([mesh.curves.ravel(), held]))
+    fixed = np.union1d(mesh.curves, np.flatnonzero(mesh.support.any(axis=1)))
     reference = np.zeros(len(mesh.X), dtype=np.int64)
     reference[fixed] = 1 + np.arange(len(fixed))
     tool: Any = MmgMeshS()
@@ -206,9 +199,7 @@ def _remesh_with_mmg(mesh: CurveMesh, size: Floats, growth: float, chord: float)
     if not np.isin(patch, mesh.patch + 1).all():
         message = "MMG cannot remesh this surface; repair its triangles first, or choose another edge length"
         raise SurfaceError(message, what="surface")
-    origin = np.append(-1, fixed)[reference]
-    known = origin >= 0
-    number = np.full(len(mesh.X), -1)
+    origin, known, number = np.append(-1, fixed)[reference], reference > 0, np.full(len(mesh.X), -1)
     number[origin[known]] = np.flatnonzero(known)
     curves = number[mesh.curves]
     lost = (curves < 0).any(axis=1) | (edge_places(curves, F[:, SIDES].reshape(-1, 2)) < 0)
@@ -223,9 +214,7 @@ def _remesh_with_mmg(mesh: CurveMesh, size: Floats, growth: float, chord: float)
 
 def _corners_to_keep(mesh: CurveMesh, size: Floats) -> Ints:
     """Triangles between curves that are as good as their corner allows, and small: MMG would split them."""
-    on_curve = np.zeros(len(mesh.X), dtype=bool)
-    on_curve[mesh.curves] = True
-    between = np.flatnonzero(on_curve[mesh.F].all(axis=1))
+    between = np.flatnonzero(np.isin(mesh.F, mesh.curves).all(axis=1))
     corners = mesh.X[mesh.F[between]]
     _, second, largest = np.sort(angles(corners), axis=1).T
     small = triangles_for(face_areas(corners), size[mesh.F[between]].mean(axis=1)) <= LARGE
@@ -233,10 +222,8 @@ def _corners_to_keep(mesh: CurveMesh, size: Floats) -> Ints:
 
 
 def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]) -> Surface:
-    """A Surface of the best triangles for each patch: they fit, because the curves are the same.
-
-    Vertices of ``old`` keep its positions: MMG scales the mesh, which changes the last digits.
-    """
+    """A Surface of the best triangles for each patch: they fit, because the curves are the same. Vertices of
+    ``old`` keep its positions: MMG scales the mesh, which changes the last digits."""
     meshes = [old, *candidates]
     angle = np.full((len(meshes), len(surface.patches)), 180.0)  # the smallest in each patch
     for row, mesh in zip(angle, meshes, strict=True):
@@ -244,13 +231,12 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
     best = 1 + np.argmax(np.minimum(angle[1:], GOOD_ANGLE), axis=0)
     reached = angle[best, np.arange(len(best))]
     best[(reached < LEAST_ANGLE) & (reached < WORSE * angle[0])] = 0
-    first = np.cumsum([0, *(len(mesh.X) for mesh in meshes)])
-    faces, patch = [], []
+    faces, patch, first = list[Ints](), list[Ints](), 0
     for number, mesh in enumerate(meshes):
         chosen = best[mesh.patch] == number
-        vertex = np.where(mesh.source >= 0, mesh.source, first[number] + np.arange(len(mesh.X)))
-        faces.append(vertex[mesh.F[chosen]])
-        patch.append(mesh.patch[chosen])
+        vertex = np.where(mesh.source >= 0, mesh.source, first + np.arange(len(mesh.X)))
+        faces, patch = [*faces, vertex[mesh.F[chosen]]], [*patch, mesh.patch[chosen]]
+        first += len(mesh.X)
     used, inverse = np.unique(np.concatenate(faces), return_inverse=True)
     F, patch_of_face = inverse.reshape(-1, 3), np.concatenate(patch)
     X = np.concatenate([mesh.X for mesh in meshes])[used]
@@ -258,18 +244,11 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
     for column, (plane, before) in enumerate(surface.on_planes, start=2):
         off = ~before[surface.faces].all(axis=1)
         lies = np.bincount(surface.patch_of_face, off, len(surface.patches)) == 0  # such as an upright wall
-        inside = np.zeros(len(X), dtype=bool)
-        inside[F[lies[patch_of_face]]] = True
-        inside &= used >= len(old.X)
+        inside = np.isin(np.arange(len(X)), F[lies[patch_of_face]]) & (used >= len(old.X))
         X[inside] = plane.nearest(X[inside])
         support[inside, column] = True
     ends = np.searchsorted(used, old.curves)
     cables = tuple(replace(c, edges=ends[old.cable == index]) for index, c in enumerate(surface.cables))
     return surface.with_mesh(
-        support,
-        vertices=X,
-        faces=F,
-        patch_of_face=patch_of_face,
-        cables=cables,
-        curves=old.on.joined(ends),
+        support, vertices=X, faces=F, patch_of_face=patch_of_face, cables=cables, curves=old.on.joined(ends)
     )

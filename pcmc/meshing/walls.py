@@ -91,7 +91,7 @@ def add_walls(
     if not walled:
         return surface
     label, patches = _labels(surface, walled, chosen)
-    tops = []
+    tops = list[UpperEdge]()
     for border, number in zip(walled, label, strict=True):  # with its first patch on the left
         chain = np.append(border.vertices, border.vertices[:1]) if border.closed else border.vertices
         own = surface.faces[surface.patch_of_face == border.sheets[0]]
@@ -137,20 +137,16 @@ def build_walls(
     ------
     SurfaceError : an upper edge is not above the floor.
     """
-    builder = _Builder(vertices, plane, edge_length, fixed, floor)
+    builder, n = _Builder(vertices, plane, edge_length, fixed, floor), len(vertices)
     for top in tops:
         builder.add_wall(top)
-    n = len(vertices)
     new = np.array(builder.points[n:]).reshape(-1, 3)
     held, sliding = (np.isin(np.arange(len(new)) + n, list(ids)) for ids in (builder.held, builder.sliding))
     faces, label = np.concatenate(builder.faces), np.concatenate(builder.labels)
     everywhere = np.concatenate([vertices, to_space(new, plane)])
-    uprights = tuple(
-        HeldCurve(polyline(everywhere[line]), np.array(line), np.arange(float(len(line))))
-        for vertex, line in builder.lines.items()
-        if fixed[vertex] and len(line) > 1
-    )
-    return WallMesh(everywhere[n:], faces, label, held, sliding & ~held, builder.feet, uprights)
+    lines = [line for vertex, line in builder.lines.items() if fixed[vertex] and len(line) > 1]
+    uprights = [HeldCurve(polyline(everywhere[v]), np.array(v), np.arange(float(len(v)))) for v in lines]
+    return WallMesh(everywhere[n:], faces, label, held, sliding & ~held, builder.feet, tuple(uprights))
 
 
 class _Builder:
@@ -178,23 +174,20 @@ class _Builder:
 
     def check(self, top: UpperEdge) -> None:
         height = self.local[top.vertices, 2] - self.floor[top.vertices]
-        inner = np.ones(len(height), dtype=bool)
-        inner[[0, -1]] = (height <= self.tolerance).all()
-        bad = np.flatnonzero((height < -self.tolerance) | (inner & (height <= self.tolerance)))
-        if len(bad):
-            vertex = int(top.vertices[bad[0]])
-            problem = (
-                f"no room for a wall under vertex {vertex}, {height[bad[0]]:.3g} above the wall's"
-                f" bottom, at {self.local[vertex].round(6).tolist()} ({len(bad)} such vertices);"
-                " raise it, or use shorter edges if both ends of the wall are held"
+        low = height <= self.tolerance
+        low[[0, -1]] &= low.all() | (height[[0, -1]] < -self.tolerance)
+        for bad in np.flatnonzero(low)[:1]:
+            vertex, at = int(top.vertices[bad]), self.local[top.vertices[bad]].round(6).tolist()
+            text = f"no room for a wall under vertex {vertex}, {height[bad]:.3g} above the wall's bottom, at"
+            text += f" {at} ({low.sum()} such vertices); raise it, or use shorter edges if both ends of the"
+            raise SurfaceError(
+                f"{text} wall are held", what="vertices", where=vertex, found=float(height[bad])
             )
-            raise SurfaceError(problem, what="vertices", where=vertex, found=float(height[bad[0]]))
 
     def line(self, vertex: int, supported: set[int]) -> list[int]:
         """Vertices of the vertical line under a vertex, from the foot up to the vertex itself."""
         if vertex not in self.lines:
-            x, y, top = self.local[vertex]
-            bottom = self.floor[vertex]
+            (x, y, top), bottom = self.local[vertex], self.floor[vertex]
             rows = 0 if top - bottom <= self.tolerance else max(1, round((top - bottom) / self.edge_length))
             new = [np.array([x, y, bottom + (top - bottom) * k / rows]) for k in range(rows)]
             self.lines[vertex] = [*self.add_points(new), vertex]
@@ -217,10 +210,9 @@ class _Builder:
         # counter-clockwise from the left foot; a line without rows is the chain's end itself
         start, end = left[:-1], right[:-1]
         ids = np.array([*start[:1], *foot, *end, *chain[::-1], *start[:0:-1]], dtype=np.int64)
-        sides = [np.zeros(len(start[:1])), np.full(len(end), along[-1]), np.zeros(len(start[1:]))]
-        s = np.concatenate([sides[0], along[1:-1], sides[1], along[::-1], sides[2]])
-        outline = np.stack([s, [self.points[i][2] for i in ids]], axis=1)
-        ring = np.arange(len(ids))
+        ends = [0.0] * len(start[:1]), [along[-1]] * len(end), [0.0] * len(start[1:])
+        s = [*ends[0], *along[1:-1], *ends[1], *along[::-1], *ends[2]]
+        outline, ring = np.stack([s, [self.points[i][2] for i in ids]], axis=1), np.arange(len(ids))
         mesh = triangulate(outline, np.stack([ring, np.roll(ring, -1)], axis=1), self.edge_length)
         s, height = mesh.points[len(ids) :].T
         x, y = (np.interp(s, along, self.local[chain, k]) for k in (0, 1))
@@ -232,11 +224,8 @@ class _Builder:
 def _labels(
     surface: Surface, borders: Sequence[EdgeCurve], tension: Mapping[tuple[str, str], float]
 ) -> tuple[list[int], list[Patch]]:
-    """A label for each border, and the labels' patches: one for each pair of patches.
-
-    Where a pair's borders cross, as of four quarters, each is a patch of its own: a patch must not have four
-    faces at an edge.
-    """
+    """A label for each border, and the labels' patches: one for each pair of patches. Where a pair's borders
+    cross, as of four quarters, each is a patch of its own: a patch must not have four faces at an edge."""
     kinds = []
     for place, border in enumerate(borders):
         ends = [c.vertices[[0, -1]] for c in borders if c.sheets == border.sheets and not c.closed]

@@ -83,11 +83,9 @@ def family_of_face(surface: Surface) -> Floats:
 
 
 def _cover(points: Floats, tolerance: float, at_least: int) -> tuple[Ints, Ints]:
-    """The family (m,) of each triangle, and its turn (m,), from points (m,w,3) in canonical order.
-
-    The best of several greedy covers is improved by search: families around a random one are dissolved and
-    covered anew, along another axis, which is kept if there are no more of them.
-    """
+    """The family (m,) of each triangle, and its turn (m,), from points (m,w,3) in canonical order. The best
+    of several greedy covers is improved by search: families around a random one are dissolved and covered
+    anew, along another axis, which is kept if there are no more of them."""
     count, turns, _ = points.shape
     axes = (0, 1, 2) if turns == 1 else (0,)  # turning makes the axes alike
     sweeps = [(axis, side) for axis in axes for side in (1.0, -1.0)]
@@ -127,11 +125,9 @@ def _sweep(points: Floats, chosen: Ints, axis: int, side: float, tolerance: floa
 
 @compiled
 def _greedy(P: Floats, owner: Ints, count: int, tolerance: float) -> tuple[Ints, Ints]:
-    """Cover triangles by cubes, each around the first point left and where it holds the most points.
-
-    Points P (k,3) ascend along the first axis; ``owner`` is the triangle of each. Returns the cube and
-    the point of each triangle.
-    """
+    """Cover triangles by cubes, each around the first point left and where it holds the most points. Points P
+    (k,3) ascend along the first axis; ``owner`` is the triangle of each. Returns the cube and the point of
+    each triangle."""
     family, place = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
     cubes = 0
     near, by_height = np.empty(len(P), dtype=np.int64), np.empty(len(P))
@@ -159,10 +155,8 @@ def _greedy(P: Floats, owner: Ints, count: int, tolerance: float) -> tuple[Ints,
 
 @compiled
 def _best_window(P: Floats, group: Ints, i: int, tolerance: float) -> tuple[float, float]:
-    """The lower corner, on axes 1 and 2, of the square around point i with the most points of the group.
-
-    The group ascends along axis 2.
-    """
+    """The lower corner, on axes 1 and 2, of the square around point i with the most points of the group. The
+    group ascends along axis 2."""
     lows = np.empty(len(group))
     size = 0
     for j in group:

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from ..base import validate
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, block_rows
 from ..forces.motion_space import motion_space, perpendicular
 from ..forces.pinching import place_wall_rows, standing_part
 from ..meshing.quality import turns_over, worst_quality
@@ -74,16 +74,12 @@ class FewerFamilies:
         return self.steps.assign(cost=cost, cheapest=cost.index == cost.idxmin())
 
     def __str__(self) -> str:
-        old, new = self.before.certificate, self.after.certificate
-        rows = [
-            ("", "before", "after"),
-            ("families", str(self.before.count), str(self.after.count)),
-            ("at least", str(self.before.at_least), str(self.after.at_least)),
-            ("residual", f"{old.residual:.1e}", f"{new.residual:.1e}"),
-            ("curvature error", f"{old.curvature_error:.1e}", f"{new.curvature_error:.1e}"),
-            ("triangle quality", f"{old.quality:.3f}", f"{new.quality:.3f}"),
-            ("verdict", old.verdict.name.lower(), new.verdict.name.lower()),
-        ]
+        columns = [("", "families", "at least", "residual", "curvature error", "triangle quality", "verdict")]
+        for name, one in (("before", self.before), ("after", self.after)):
+            c, counts = one.certificate, (str(one.count), str(one.at_least))
+            numbers = f"{c.residual:.1e}", f"{c.curvature_error:.1e}", f"{c.quality:.3f}"
+            columns.append((name, *counts, *numbers, c.verdict.name.lower()))
+        rows = zip(*columns, strict=True)
         table = "\n".join(f"{name:>16}  {one:>13}  {other:>13}" for name, one, other in rows)
         return f"{table}\nchange of shape {self.change:.3g}, vertices moved up to {self.moved:.3g}"
 
@@ -124,19 +120,16 @@ def fewer_families(
     validate.integer("rounds", rounds, least=1)
     validate.callback("callback", callback, "a function of two numbers")
     options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
-    before = panels(surface, tolerance, anyway=anyway, **options)
+    before = after = panels(surface, tolerance, anyway=anyway, **options)
     search = _Search(before, change, at_rest)
     made = search.run(rounds, callback)
-    after = before
     if search.best is not surface:
         after = panels(search.best, tolerance, anyway=True, **options)
-    corners = np.unique(search.faces)
-    motion = np.linalg.norm(after.surface.vertices - surface.vertices, axis=1)[corners]
+    moved = np.linalg.norm(after.surface.vertices - surface.vertices, axis=1)[search.corners].max()
     steps = pd.DataFrame(search.steps, columns=["families", "change"])
     least = steps["change"].iloc[::-1].cummin().iloc[::-1].shift(-1, fill_value=np.inf)  # with fewer families
     steps = steps[steps["change"] < least].reset_index(drop=True)
-    left = search.leaves(after.surface.vertices)
-    return FewerFamilies(before, after, left, float(motion.max()), made, steps)
+    return FewerFamilies(before, after, search.leaves(after.surface.vertices), float(moved), made, steps)
 
 
 class _Search:
@@ -158,9 +151,7 @@ class _Search:
         settings = list(product(WIDER, INSIDE))
         current = misses = made = 0
         while made < rounds and misses < len(settings):
-            surface = self._round(*settings[current])
-            made += 1
-            count = self.count
+            surface, made, count = self._round(*settings[current]), made + 1, self.count
             if surface is not None:
                 lengths = self._lengths(surface.vertices)
                 count = int(triangle_families(lengths, self.tolerance, self.apart).family.max()) + 1
@@ -208,19 +199,16 @@ class _Search:
         return surface if self.leaves(surface.vertices) <= self.change else None
 
     def _step(self, X: Floats, targets: Floats, inside: float) -> Floats | None:
-        """A damped Gauss-Newton step on the edges farther than ``inside`` from their targets, or None.
-
-        It is shortened until no triangle turns over or is much worse, and no corner leaves the shape.
-        """
+        """A damped Gauss-Newton step on the edges farther than ``inside`` from their targets, or None. It is
+        shortened until no triangle turns over or is much worse, and no corner leaves the shape."""
         edges = edge_vectors(X[self.faces])
         lengths = np.linalg.norm(edges, axis=2)
         off = lengths - targets
-        excess = np.sign(off) * np.maximum(np.abs(off) - inside, 0.0)
+        excess = off - np.clip(off, -inside, inside)
         face, side = np.nonzero(excess)
         if not len(face):
             return None
-        surface = self.best
-        part = standing_part(surface)
+        part = standing_part(self.best)
         space = motion_space(part.surface, part.classes, X)
         # the directions (n,3,3) in which each vertex may move, rows, zero for none; their damping (n,3)
         basis, dimension = space.basis, space.dimension
@@ -234,19 +222,16 @@ class _Search:
             frame[sheet, 2] = basis[sheet, 0]
             frame[curve, 1:] = basis[curve, :2]
         unit = edges[face, side] / lengths[face, side][:, None]
-        tail, head = self.faces[face, (side + 1) % 3], self.faces[face, (side + 2) % 3]
-        towards = np.einsum("ej,ekj->ek", unit, frame[head]), -np.einsum("ej,ekj->ek", unit, frame[tail])
-        columns = 3 * np.stack([head, tail], axis=1)[:, :, None] + np.arange(3)
-        rows = np.repeat(np.arange(len(unit)), 6)  # J: the derivatives of the lengths
-        values = np.stack(towards, axis=1).ravel()
-        J = csr_array((values, (rows, columns.ravel())), shape=(len(unit), 3 * len(frame)))
+        ends = self.faces[face[:, None], (side[:, None] + [2, 1]) % 3]  # J: the derivatives of the lengths
+        slopes = np.einsum("ej,eakj,a->eak", unit, frame[ends], [1.0, -1.0])
+        J = block_rows(slopes[:, :, None], ends, len(frame))
         system = csc_array(J.T @ J + diags_array(damping.ravel()))
         move = -splu(system, permc_spec="MMD_AT_PLUS_A").solve(J.T @ excess[face, side])
         motion = np.einsum("vk,vkj->vj", move.reshape(-1, 3), frame)
         share = 1.0
         while share >= SHORTEST:
-            slid = onto_circles(surface, X + share * motion)
-            Y = place_wall_rows(surface, part.walls, slid, space)
+            slid = onto_circles(self.best, X + share * motion)
+            Y = place_wall_rows(self.best, part.walls, slid, space)
             turned, worst = turns_over(X, Y, self.faces), worst_quality(Y, self.faces)
             if not turned and worst >= self.quality and (self.at_rest or self.leaves(Y) <= self.change):
                 return Y

@@ -8,7 +8,7 @@ triangles join of the pieces. It has a node where three panels or two and a rim 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -17,6 +17,7 @@ from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..base.errors import OptionError
 from ..base.libraries import load_library
+from ..meshing.planar import twins
 from ..surface import Surface
 from ..surface.geometry import cross_2d, segment_lengths, unit_vectors
 from ..surface.topology import components
@@ -25,7 +26,6 @@ from .sheet import SheetMesh
 
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])  # corners of the panels from their place
 HEXAGON = np.array([[0, 1], [6, -1], [12, 1], [12, 5], [6, 7], [0, 5]]) / 6.0  # and i + j even
-NUDGE = 1e-6  # of a step: a vertex is at least so far from every line
 GRID = 1e-10  # of a step: cuts lie on a grid so fine
 SAME = 1e-8  # of the size: points that are so near are one
 ROUNDING = 1e-6  # of barycentric coordinates
@@ -80,20 +80,6 @@ def counted(count: Ints) -> tuple[Ints, Ints]:
     return number, np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)
 
 
-def nudged(values: Floats, place: Ints, up: Bools | None = None) -> Floats:
-    """(m,3) the values (k,) at corners ``place`` (m,3), none nearer to a whole number than ``NUDGE``.
-
-    A boundary that lies on a line is moved inwards, so that the line is the boundary of the panels beside it.
-    Values marked ``up`` (k,) are moved upwards.
-    """
-    line = np.rint(values)
-    away = values[place].mean(axis=1)[:, None] - line[place]
-    inward = np.bincount(place.ravel(), away.ravel(), len(values))
-    down = inward < 0.0 if up is None else (inward < 0.0) & ~up
-    away = line + NUDGE * np.where(down, -1.0, 1.0)
-    return np.where(np.abs(values - line) < NUDGE, away, values)[place]
-
-
 def net(surface: Surface, parts: Sequence[SheetNet], size: float, hexagons: bool = False) -> Net:
     """The net of a roof's sheets; OptionError where a panel is no polygon, as one with a hole."""
     topo, faces = surface.topology, np.concatenate([part.faces for part in parts])
@@ -126,6 +112,7 @@ def net(surface: Surface, parts: Sequence[SheetNet], size: float, hexagons: bool
     (a, b), t = ends[order].T, share[loop, None]
     on_line = np.concatenate([part.on_line[part.sheet.F] for part in parts])[row[a]]
     on_line[np.arange(len(a)), opposite[order]] = True
+    cut = np.bincount(owner, rim[order] & ~on_line.all(axis=1)) > 0
     turned = np.bincount(panel, np.concatenate([part.turned for part in parts])[row]) / np.bincount(panel)
     normals = np.concatenate([part.sheet.normals[part.sheet.F] for part in parts])[row[a]]
     normal = np.einsum("kc,kci->ki", weights[a] + t * (weights[b] - weights[a]), normals)
@@ -134,16 +121,10 @@ def net(surface: Surface, parts: Sequence[SheetNet], size: float, hexagons: bool
     once = np.unique(np.stack([corner, sheet[a[kept]]]), axis=1, return_index=True)[1]
     mean = np.zeros((len(used), 3))
     np.add.at(mean, corner[once], normal[kept[once]])
-    return Net(
-        points[np.unique(vertex, return_index=True)[1][used]],
-        unit_vectors(mean),
-        kind[used],
-        np.searchsorted(owner[kept], np.arange(len(start))),
-        corner,
-        sheet[a[start[:-1]]],
-        np.bincount(owner, rim[order] & ~on_line.all(axis=1)) > 0,
-        turned[panel[a[start[:-1]]]],
-    )
+    at, first = points[np.unique(vertex, return_index=True)[1][used]], a[start[:-1]]
+    begins = np.searchsorted(owner[kept], np.arange(len(start)))
+    about = kind[used], begins, corner, sheet[first], cut, turned[panel[first]]
+    return Net(at, unit_vectors(mean), *about)
 
 
 def tidied(net: Net, size: float) -> Net:
@@ -156,9 +137,8 @@ def tidied(net: Net, size: float) -> Net:
     first = np.lexsort((-kind, label))
     stays = first[np.unique(label[first], return_index=True)[1]]
     crowded = np.bincount(label[kind == CORNER], minlength=len(stays)) > 1
-    number = np.where(crowded[label], np.arange(len(P)), stays[label])
+    used = np.where(crowded[label], np.arange(len(P)), stays[label])[corner]
     owner = np.repeat(np.arange(len(start) - 1), np.diff(start))
-    used = number[corner]
     shown = used != used[before(start)]
     while True:
         used, owner = used[shown], owner[shown]
@@ -172,18 +152,17 @@ def tidied(net: Net, size: float) -> Net:
         shown &= (kind[used] != EDGE) | (uses[used] > 1)  # else no other panel ends there
         if shown.all():
             break
-    left, panels = owner[start[:-1]], dict[str, Any](start=start)
-    panels |= {name: getattr(net, name)[left] for name in ("sheet", "cut", "turned")}
-    nodes, panels["corner"] = np.unique(used, return_inverse=True)
-    return net._replace(points=P[nodes], normals=net.normals[nodes], kind=kind[nodes], **panels)
+    left = owner[start[:-1]]
+    of_panels = {name: getattr(net, name)[left] for name in ("sheet", "cut", "turned")}
+    nodes, corner = np.unique(used, return_inverse=True)
+    of_nodes = {"points": P[nodes], "normals": net.normals[nodes], "kind": kind[nodes]}
+    return net._replace(start=start, corner=corner, **of_panels, **of_nodes)
 
 
 def without_flat(net: Net, size: float) -> Net:
-    """Without triangles that planarity has laid flat on a straight rim; their nodes come to lie on it.
-
-    The panels on both sides of such a triangle reach the rim: their planes meet only there, and so their
-    common node comes to lie on it.
-    """
+    """Without triangles that planarity has laid flat on a straight rim; their nodes come to lie on it. The
+    panels on both sides of such a triangle reach the rim: their planes meet only there, and so their common
+    node comes to lie on it."""
     P, start, corner, sides = net.points, net.start, net.corner, net.sides
     _, row, uses = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
     back, rim, count = before(start), uses[row.ravel()] == 1, np.diff(start)
@@ -203,10 +182,8 @@ def without_flat(net: Net, size: float) -> Net:
 
 
 def _pieces(at: Floats, hexagons: bool) -> tuple[Ints, Ints, Floats]:
-    """The pieces of triangles with coordinates ``at`` (m,3,2) between lines, counter-clockwise.
-
-    (k,) the triangle of each corner of a piece; (k,) its piece, ascending; (k,3) its place in the triangle.
-    """
+    """The pieces of triangles with coordinates ``at`` (m,3,2) between lines, counter-clockwise. (k,) the
+    triangle of each corner of a piece; (k,) its piece, ascending; (k,3) its place in the triangle."""
     shapely = load_library("shapely", "plan")
     shape = HEXAGON if hexagons else SQUARE
     low = np.floor(at.min(axis=1)) - hexagons
@@ -236,9 +213,7 @@ def _outlines(row: Ints, piece: Ints, sheet: Ints, vertex: Ints) -> tuple[Ints, 
     ends = np.stack([before(start), np.arange(len(piece))], axis=1)
     ends = ends[vertex[ends[:, 0]] != vertex[ends[:, 1]]]
     sides = np.column_stack([sheet[ends[:, 0]], np.sort(vertex[ends], axis=1)])
-    order = np.lexsort(sides.T)
-    twin = np.flatnonzero((np.diff(sides[order], axis=0) == 0).all(axis=1))
-    pair = order[np.stack([twin, twin + 1], axis=1)]
+    pair = twins(np.unique(sides, axis=0, return_inverse=True)[1].ravel())
     inner = np.ptp(row[ends[pair, 0]], axis=1) > 0  # else between two panels, on a line in a triangle
     panel = components(piece[ends[pair[inner], 0]], int(piece[-1]) + 1)[piece]
     rim, outer = np.ones((2, len(ends)), dtype=bool)
@@ -248,45 +223,37 @@ def _outlines(row: Ints, piece: Ints, sheet: Ints, vertex: Ints) -> tuple[Ints, 
 
 
 def _split(edge: Ints, ends: Ints, place: Floats) -> tuple[Ints, Ints, Ints, Floats]:
-    """Sides of panels from vertex to vertex of all that have ``ends`` (s,2) on their edge, at ``place``.
-
-    (k,) the side that each is a part of, its two vertices, and where on the side it starts, 0 to 1.
-    """
+    """Sides of panels from vertex to vertex of all that have ``ends`` (s,2) on their edge, at ``place``. (k,)
+    the side that each is a part of, its two vertices, and where on the side it starts, 0 to 1."""
     spots = np.stack([np.repeat(edge, 2), ends.ravel()], axis=1)
     spots, index, number = np.unique(spots, axis=0, return_index=True, return_inverse=True)
     place = place.ravel()[index]
     order = np.lexsort((place, spots[:, 0]))
     start, end = np.argsort(order)[number.ravel()].reshape(-1, 2).T
     side, k = counted(np.abs(end - start))
-    way = np.sign(end - start)[side]
-    tail, head = order[start[side] + way * k], order[start[side] + way * (k + 1)]
-    first, last = place[order[start]][side], place[order[end]][side]
+    at = start[side] + np.sign(end - start)[side] * (k + np.arange(2)[:, None])
+    (tail, head), (first, last) = order[at], place[order[[start, end]]][:, side]
     return side, spots[tail, 1], spots[head, 1], (place[tail] - first) / (last - first)
 
 
+@compiled
 def _loops(panel: Ints, tail: Ints, head: Ints) -> tuple[Ints, Ints, Ints]:
     """The sides of each panel in turn: where each starts (p+1,), the sides; panels that are no polygon."""
-    width = int(max(tail.max(), head.max())) + 1
-    begins = panel * width + tail
-    order = np.argsort(begins)
-    after = order[np.searchsorted(begins, panel * width + head, sorter=order) % len(order)]
-    start, loop = _cycles(after)
-    loops = np.bincount(panel[loop[start[:-1]]], minlength=panel.max() + 1)
-    torn = np.bincount(panel, (panel[after] != panel) | (tail[after] != head)) > 0
-    return start, loop, np.flatnonzero(torn | (loops != 1))
-
-
-@compiled
-def _cycles(follow: Ints) -> tuple[Ints, Ints]:
-    """The cycles of a permutation: the first place of each (p+1,), and all in order."""
-    seen = np.zeros(len(follow), dtype=np.bool_)
+    width, count = max(tail.max(), head.max()) + 1, len(panel)
+    order = np.argsort(panel * width + tail)
+    begins = (panel * width + tail)[order]
+    after = order[np.searchsorted(begins, panel * width + head) % count]
+    seen, bad = np.zeros(count, dtype=np.bool_), np.ones(panel.max() + 1, dtype=np.int64)  # 0: one loop
     start, loop = [0], [0]
-    for h in range(len(follow)):
-        at = h
+    for side in range(count):
+        at = side
         while not seen[at]:
             seen[at] = True
             loop.append(at)
-            at = follow[at]
+            if panel[after[at]] != panel[at] or tail[after[at]] != head[at]:
+                bad[panel[at]] += count + 1
+            at = after[at]
         if len(loop) - 1 > start[-1]:
+            bad[panel[side]] -= 1
             start.append(len(loop) - 1)
-    return np.array(start), np.array(loop)[1:]
+    return np.array(start), np.array(loop)[1:], np.flatnonzero(bad)

@@ -24,10 +24,9 @@ from ..surface.distance import distances
 from ..surface.geometry import cross_2d, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
-from .isothermic import curvature_coordinates
-from .net import INSIDE, Net, SheetNet, net, nudged, tidied, without_flat
-from .planar import before, convex, planarised, planarity, polygon_areas, torsion, torsion_free_axes
-from .sheet import SheetMesh, sheets_of
+from .net import INSIDE, Net, SheetNet, net, tidied, without_flat
+from .planar import before, convex, middles, planarised, planarity, polygon_areas, torsion, torsion_free_axes
+from .sheet import SheetMesh, curvature_coordinates, nudged, sheets_of
 
 PATTERNS = ("planar-quads", "quads", "hexagons")
 LARGEST = 0.5  # of a sheet's size: larger panels are refused
@@ -105,13 +104,11 @@ class PanelNet:
     @property
     def mesh(self) -> Surface:
         """The panels as triangles around their middles, a patch for each panel: "panel 1" and so on."""
-        count = np.diff(self.start)
-        owner = np.repeat(np.arange(len(count)), count)
-        middle = np.add.reduceat(self.points[self.corner], self.start[:-1]) / count[:, None]
+        owner = np.repeat(np.arange(len(self.panels)), np.diff(self.start))
         faces = np.stack([self.corner[before(self.start)], self.corner, len(self.points) + owner], axis=1)
         tensions = {patch.name: patch.tension for patch in self.surface.patches}
         patches = tuple(Patch(f"panel {k}", tensions[name]) for k, name in enumerate(self.panels["patch"], 1))
-        X = np.concatenate([self.points, middle])
+        X = np.concatenate([self.points, middles(self.points, self.start, self.corner)])
         return Surface(X, faces, owner, patches, fixed=np.ones(len(X), dtype=bool), plane=self.surface.plane)
 
     def write_obj(self, path: str | PathLike[str], mark: str = "") -> None:
@@ -139,27 +136,27 @@ class PanelNet:
         """Totals, with the units of the numbers if they are given."""
         table, beams, nodes = self.panels, self.beams, self.nodes
         kinds = ", ".join(f"{count} {kind}" for kind, count in table["kind"].value_counts().items())
-        worst, area = table.iloc[table["planarity"].argmax()], table["area"]
+        worst, area, bent = table.iloc[table["planarity"].argmax()], table["area"], table["planarity"]
         rows = {"panels": f"{len(table)}: {kinds}; {len(self.points)} nodes, {len(beams)} beams"}
         rows["area"] = f"{area.sum():.6g}, {100.0 * self.covered:.2f} % of the roof's;"
         rows["area"] += f" panels {area.min():.3g} to {area.max():.3g}"
-        rows["planarity"] = f"median {table['planarity'].median():.2g}, largest {worst['planarity']:.2g}"
+        rows["planarity"] = f"median {bent.median():.2g}, largest {worst['planarity']:.2g}"
         rows["planarity"] += f" (panel {worst['panel']}, {worst['kind']})"
-        if warped := int((table["planarity"] > WARPED).sum()):
+        if warped := int((bent > WARPED).sum()):
             at = point_text(self.points[self.polygons[int(worst["panel"]) - 1]].mean(axis=0).round(2))
             text = f"{warped} panels by more than {100.0 * WARPED:g} % of their diagonals, most at {at}:"
             rows["warped"] = f"{text} build these of triangles, or choose another pattern"
-        away = f"nodes {nodes['distance'].max():.3g}, panels {table['distance'].max():.3g}"
-        rows["distance"] = f"from the surface, {away}"
+        far = nodes["distance"].max()
+        rows["distance"] = f"from the surface, nodes {far:.3g}, panels {table['distance'].max():.3g}"
         turns = [f(beams[name]) for name in ("torsion", "torsion_normal") for f in (np.median, np.max)]
         torsion = "of beams, median {:.2g}, largest {:.3g} degrees; along normals {:.2g} and {:.3g}"
         rows["torsion"] = torsion.format(*turns)
         if len(self.umbilics):
             places = ", ".join(point_text(place.round(2)) for place in self.umbilics[:6])
             rows["umbilics"] = f"{len(self.umbilics)}: {places}"
-        if (far := nodes["distance"].max() / self.size) > FAR:
-            text = f"nodes are up to {100.0 * far:.0f} % of the size from the surface: choose a smaller size"
-            rows["far off"] = f"{text}, or pattern 'quads'"
+        if far > FAR * self.size:
+            text = f"nodes are up to {100.0 * far / self.size:.0f} % of the size from the surface: choose a"
+            rows["far off"] = f"{text} smaller size, or pattern 'quads'"
         if flat := table["panel"][area < NO_AREA * self.size**2].tolist():
             text = f"{len(flat)} panels have next to no area, as panel {flat[0]}: choose another size"
             rows["slivers"] = text
@@ -179,7 +176,6 @@ def panel_net(
 
     Parameters
     ----------
-    surface : a certified surface.
     size : of a panel's edge, length, in the mean.
     pattern : "planar-quads" along lines of curvature, made planar; "quads" between the lines of a grid in
         plan, with their nodes on the surface; or "hexagons" of a grid in plan, made planar.
@@ -241,13 +237,11 @@ def _sheet_net(
         raise OptionError(f"{text} {1.01 * least:.2g}", what="size", found=size, expected=least)
     if pattern == "planar-quads":
         return SheetNet(name, faces, sheet, *curvature_coordinates(sheet, size, name))
-    hexagons = pattern == "hexagons"
-    angle = np.radians(direction)
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    c, s = np.cos(np.radians(direction)), np.sin(np.radians(direction))
     plan, every = (X @ surface.plane.axes[:2].T for X in (sheet.X, surface.vertices))
     middle = 0.5 * (every.max(axis=0) + every.min(axis=0))
-    steps = size * (np.array([0.5 * np.sqrt(3.0), 1.5]) if hexagons else np.ones(2))
-    grid = (plan - middle) @ turn.T / steps
+    steps = np.array([0.5 * np.sqrt(3.0), 1.5]) if pattern == "hexagons" else np.ones(2)
+    grid = (plan - middle) @ np.array([[c, -s], [s, c]]) / (size * steps)
     at = np.stack([nudged(grid[:, k], sheet.F) for k in range(2)], axis=2)
     over = cross_2d(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]) <= 0.0
     if over.any():
@@ -263,50 +257,28 @@ def net_tables(
 ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     """Nodes, panels and beams of a net; see ``PanelNet``."""
     P, N, start, corner = net.points, net.normals, net.start, net.corner
-    middle = np.add.reduceat(P[corner], start[:-1]) / np.diff(start)[:, None]
     roof = surface.faces[surface.roof[surface.patch_of_face]]
-    away = distances(np.concatenate([P, middle]), surface.vertices, roof)
+    away = distances(np.concatenate([P, middles(P, start, corner)]), surface.vertices, roof)
     cosine = np.einsum("ni,ni->n", axes, N) / np.linalg.norm(axes, axis=1)
-    nodes = pd.DataFrame(
-        {
-            "node": np.arange(len(P)) + 1,
-            **dict(zip("xyz", P.T, strict=True)),
-            "kind": KINDS[net.kind],
-            "distance": away[: len(P)],
-            "lean": np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))),
-        }
-    )
+    lean = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    nodes = pd.DataFrame({"node": np.arange(len(P)) + 1, **dict(zip("xyz", P.T, strict=True))})
+    nodes = nodes.assign(kind=KINDS[net.kind], distance=away[: len(P)], lean=lean)
     inside = np.add.reduceat(net.kind[corner] != INSIDE, start[:-1]) == 0
     umbilic = inside & (np.diff(start) != 4) & any(len(part.umbilics) for part in parts)
-    panels = pd.DataFrame(
-        {
-            "panel": np.arange(len(middle)) + 1,
-            "patch": [parts[k].name for k in net.sheet],
-            "kind": np.select([net.cut, umbilic], ["cut", "umbilic"], "whole"),
-            "corners": np.diff(start),
-            "area": polygon_areas(P, start, corner),
-            "planarity": planarity(P, start, corner),
-            "convex": convex(P, start, corner),
-            "distance": np.maximum(np.maximum.reduceat(away[corner], start[:-1]), away[len(P) :]),
-            "turned": net.turned,
-        }
-    )
-    panel = np.repeat(panels["panel"].to_numpy(), panels["corners"])
-    ends, first, row = np.unique(net.sides, axis=0, return_index=True, return_inverse=True)
-    neighbour = np.zeros(len(ends), dtype=np.int64)
-    other = np.ones(len(panel), dtype=bool)
-    other[first] = False
-    neighbour[row.ravel()[other]] = panel[other]
-    beams = pd.DataFrame(
-        {
-            "beam": np.arange(len(ends)) + 1,
-            "node": ends[:, 0] + 1,
-            "other": ends[:, 1] + 1,
-            "length": segment_lengths(P, ends),
-            "panel": panel[first],
-            "neighbour": neighbour,
-            "torsion": torsion(P, ends, axes),
-            "torsion_normal": torsion(P, ends, N),
-        }
-    )
-    return nodes, panels, beams
+    panels = pd.DataFrame({"panel": np.arange(1, len(start)), "patch": [parts[k].name for k in net.sheet]})
+    panels["kind"] = np.select([net.cut, umbilic], ["cut", "umbilic"], "whole")
+    panels["corners"] = np.diff(start)
+    panels["area"] = polygon_areas(P, start, corner)
+    panels["planarity"], panels["convex"] = planarity(P, start, corner), convex(P, start, corner)
+    panels["distance"] = np.maximum(np.maximum.reduceat(away[corner], start[:-1]), away[len(P) :])
+    panels["turned"] = net.turned
+    # the first and the last panel at each side; a second one is its neighbour
+    sides = pd.DataFrame(net.sides + 1, columns=["node", "other"])
+    sides["panel"] = sides["neighbour"] = np.repeat(panels["panel"].to_numpy(), panels["corners"])
+    groups = sides.groupby(["node", "other"])
+    beams = groups.agg({"panel": "first", "neighbour": "last"}).reset_index()
+    beams["neighbour"] *= groups.size().to_numpy() > 1
+    ends = beams[["node", "other"]].to_numpy() - 1
+    beams.insert(0, "beam", np.arange(len(ends)) + 1)
+    beams.insert(3, "length", segment_lengths(P, ends))
+    return nodes, panels, beams.assign(torsion=torsion(P, ends, axes), torsion_normal=torsion(P, ends, N))

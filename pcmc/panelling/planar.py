@@ -38,6 +38,11 @@ def before(start: Ints) -> Ints:
     return places
 
 
+def middles(P: Floats, start: Ints, corner: Ints) -> Floats:
+    """(p,3) the means of the corners of polygons."""
+    return np.add.reduceat(P[corner], start[:-1]) / np.diff(start)[:, None]
+
+
 def polygon_areas(P: Floats, start: Ints, corner: Ints) -> Floats:
     """(p,) areas of polygons of nodes P (n,3), length²; of a warped one, seen along its mean normal.
 
@@ -115,22 +120,18 @@ def laid_flat_polygons(P: Floats, start: Ints, corner: Ints) -> tuple[list[Float
 
 
 def planarised(P: Floats, start: Ints, corner: Ints, moves: Bools) -> Floats:
-    """Nodes P (n,3) moved until the polygons are planar; only those in the mask (n,) move.
-
-    First as far as the nodes stay near their places. Polygons that are still ``WARPED`` are then left: they
-    would draw others far away. The rest is made planar to ``FLAT``.
-    """
-    near = _gauss_newton(P, start, corner, moves, HOLD)
-    rest = np.flatnonzero(planarity(near, start, corner) < WARPED)
-    count = np.diff(start)[rest]
-    kept = np.repeat(start[rest] - np.cumsum(count) + count, count) + np.arange(count.sum())
-    return _gauss_newton(near, np.append(0, np.cumsum(count)), corner[kept], moves, 0.0)
+    """Nodes P (n,3) moved until the polygons are planar; only those in the mask (n,) move. First as far as
+    the nodes stay near their places. Polygons that are still ``WARPED`` are then left: they would draw others
+    far away. The rest is made planar to ``FLAT``."""
+    near, count = _gauss_newton(P, start, corner, moves, HOLD), np.diff(start)
+    rest = planarity(near, start, corner) < WARPED
+    begins = np.append(0, np.cumsum(count[rest]))
+    return _gauss_newton(near, begins, corner[np.repeat(rest, count)], moves, 0.0)
 
 
 def _gauss_newton(P: Floats, start: Ints, corner: Ints, moves: Bools, hold: float) -> Floats:
     """The least of Σ|r|² + hold |P - P₀|². With z the heights of a polygon's corners over its plane of best
-    fit, r is the part of z that no other plane takes up, and its derivative exact where z = 0.
-    """
+    fit, r is the part of z that no other plane takes up, and its derivative exact where z = 0."""
     n, first_place, size = len(P), P, np.linalg.norm(P[corner[1:]] - P[corner[:-1]], axis=1).mean()
     free = np.flatnonzero(np.repeat(moves, 3))
     for _ in range(STEPS):
@@ -154,11 +155,9 @@ def _gauss_newton(P: Floats, start: Ints, corner: Ints, moves: Bools, hold: floa
 
 
 def torsion_free_axes(P: Floats, edges: Ints, normals: Floats) -> Floats:
-    """(n,3) an axis of each node, so that P + d·axis has edges as parallel to those of P as can be.
-
-    Where they are parallel, the beam between two nodes is plane: it has no torsion. The least squares of
-    (a_j - a_i) × e over the edges, with e their unit vectors, near the unit ``normals`` (n,3).
-    """
+    """(n,3) an axis of each node, so that P + d·axis has edges as parallel to those of P as can be. Where
+    they are parallel, the beam between two nodes is plane: it has no torsion. The least squares of (a_j -
+    a_i) × e over the edges, with e their unit vectors, near the unit ``normals`` (n,3)."""
     e = unit_vectors(P[edges[:, 1]] - P[edges[:, 0]])
     across = np.cross(np.eye(3), e[:, None]).transpose(0, 2, 1)  # times a is a × e
     M = block_rows(np.stack([-across, across], axis=1), edges, len(P))

@@ -13,22 +13,6 @@ from ..surface.curves import Curve, arc, bezier, circle, ellipse, join, polyline
 from .parts import CableLine, Divider, Hole, PatchSpec
 from .plan import Plan, patch_names, plan_from
 
-__all__ = [
-    "CableLine",
-    "Curve",
-    "Divider",
-    "Hole",
-    "PatchSpec",
-    "Plan",
-    "add_walls",
-    "arc",
-    "bezier",
-    "circle",
-    "curve",
-    "ellipse",
-    "join",
-    "patch_names",
-    "plan_from",
-    "polyline",
-    "surface_from_labels",
-]
+__all__ = ["CableLine", "Curve", "Divider", "Hole", "PatchSpec", "Plan", "add_walls", "arc", "bezier"]
+__all__ += ["circle", "curve", "ellipse", "join", "patch_names", "plan_from", "polyline"]
+__all__ += ["surface_from_labels"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import compress, pairwise
 
 import numpy as np
 import shapely
@@ -90,8 +90,7 @@ def arrange(
     points = np.concatenate([points, required_points[alone[np.unique(own, return_index=True)[1]]]])
     used = np.unique(np.concatenate([vertex, *(chain.vertices for chain in chains)]))
     chains = [replace(chain, vertices=np.searchsorted(used, chain.vertices)) for chain in chains]
-    required = np.searchsorted(used, vertex)
-    return Arrangement(points[used, :2], points[used, 2], tuple(chains), required)
+    return Arrangement(points[used, :2], points[used, 2], tuple(chains), np.searchsorted(used, vertex))
 
 
 def hole_points(drawn: Arrangement, lines: Sequence[PlanLine]) -> list[tuple[float, float]]:
@@ -111,10 +110,8 @@ def _ends(tree: LineTree, snap: float) -> Iterator[Cut]:
     for end, xy, places, inner in zip(ends, at, tree.at(at, snap), within, strict=True):
         one, passing = tree.lines[end[0]], [place for place in places if place[0] != end[0]]
         if one.kind is Kind.DIVIDER and not passing and inner:
-            others = [other for other in tree.lines if other is not one]
-            gaps = [float(other.nearest(xy[None])[1][0]) for other in others]
-            gap, nearest = min(gaps), others[int(np.argmin(gaps))]
-            problem = f"ends at {point_text(xy)} without reaching another line; {nearest.name} is nearest,"
+            gap, nearest = min((float(o.nearest(xy[None])[1][0]), o.name) for o in tree.lines if o is not one)
+            problem = f"ends at {point_text(xy)} without reaching another line; {nearest} is nearest,"
             raise one.error(f"{problem} {gap:.3g} away: extend the divider to it", tuple(xy.tolist()), gap)
         yield [end, *passing]
 
@@ -126,13 +123,12 @@ def _nodes(
     lines: Sequence[PlanLine], cuts: Sequence[Cut], snap: float
 ) -> tuple[Floats, Ints, list[LineNodes]]:
     """The vertices where lines meet, one for those nearer than ``snap``: their points (k,3) with heights, the
-    vertex of each cut, -1 for none, and the nodes along each line; a closed one returns to its first.
-    """
-    line = np.array([i for cut in cuts for i, _ in cut], dtype=np.int64)
-    t = np.array([s for cut in cuts for _, s in cut])
-    of_cut = np.full(len(cuts), -1)
+    vertex of each cut, -1 for none, and the nodes along each line; a closed one returns to its first."""
+    along_lines: list[LineNodes] = [[] for _ in lines]
+    line, t = np.reshape([place for cut in cuts for place in cut], (-1, 2)).T
+    line, of_cut = line.astype(np.int64), np.full(len(cuts), -1)
     if not len(line):
-        return np.zeros((0, 3)), of_cut, [[] for _ in lines]
+        return np.zeros((0, 3)), of_cut, along_lines
     where = np.empty((len(line), 3))
     for number in np.unique(line):
         where[line == number] = lines[number].curve.at(t[line == number])
@@ -144,10 +140,9 @@ def _nodes(
     of_cut[count > 0] = node[first[count > 0]]
     kind = np.array([lines[i].kind for i in line])
     order = np.lexsort((kind, node))
-    leader = order[np.searchsorted(node[order], np.arange(node.max() + 1))]
+    leader = order[np.unique(node[order], return_index=True)[1]]
     points = where[leader]
     points[kind[leader] == Kind.DIVIDER, 2] = np.nan
-    along_lines: list[LineNodes] = [[] for _ in lines]
     for k in np.lexsort((node, t)).tolist():
         along = along_lines[line[k]]
         if not along or along[-1][1] != node[k]:
@@ -164,10 +159,9 @@ def _chains(
     lines: Sequence[PlanLine], nodes: Floats, along_lines: Sequence[LineNodes], edge_length: float
 ) -> tuple[list[Chain], Floats]:
     """Each line's chains from node to node; the points (n,3) of the nodes, and of the chains between."""
-    chains: list[Chain] = []
+    chains, direct = list[Chain](), set[tuple[int, int]]()
     new, n = [nodes], len(nodes)
     given = set(np.flatnonzero(~np.isnan(nodes[:, 2])).tolist())
-    direct: set[tuple[int, int]] = set()
     for number, (one, along) in enumerate(zip(lines, along_lines, strict=True)):
         curve, divides = one.curve, one.kind is Kind.DIVIDER
         known = [1.0, 1.0, np.nan if divides else 1.0]
@@ -205,9 +199,8 @@ def _inside_plan(tree: LineTree, chains: list[Chain], points: Floats, edge_lengt
         along = [other for other, _ in places if other != one]
         if along:
             raise overlap(lines[one], lines[along[0]], f"near {point_text(xy)}")
-    chains = [chain for chain, keep in zip(chains, kept, strict=True) if keep]
-    gone = set(range(len(lines))) - {chain.line for chain in chains}
-    if gone:
+    chains = list(compress(chains, kept))
+    if gone := set(range(len(lines))) - {chain.line for chain in chains}:
         raise lines[min(gone)].error("is outside the plan or in a hole")
     # lines may cross only because their bends are replaced by straight edges
     ends = points[np.concatenate([chain.edges for chain in chains])]

@@ -131,20 +131,16 @@ def _with_sheet_below(surface: Surface, factor: float) -> Surface:
             text = "cushion: a triangle has all corners on the rim; use a smaller edge_length"
             raise PlanError(text, what="edge_length", where=surface.vertices[b].round(3).tolist())
         F[f], F[g] = (b, a, d), (b, d, c)
-    n, normal = surface.n, np.array(surface.plane.normal)
-    number = np.where(surface.pinned, np.arange(n), n + np.cumsum(~surface.pinned) - 1)
-    inner = ~surface.pinned
+    n, inner, patches = surface.n, ~surface.pinned, surface.patches
+    number = np.where(inner, n + np.cumsum(inner) - 1, np.arange(n))
     free = surface.vertices[inner]
-    image = free - 2.0 * surface.plane.height(free)[:, None] * normal
-    below = [
-        replace(patch, name=f"{patch.name}{BELOW}", tension=factor * patch.tension, snow=0.0)
-        for patch in surface.patches
-    ]
+    image = free - 2.0 * surface.plane.height(free)[:, None] * np.array(surface.plane.normal)
+    below = [replace(p, name=f"{p.name}{BELOW}", tension=factor * p.tension, snow=0.0) for p in patches]
     return Surface(
         np.concatenate([surface.vertices, image]),
         np.concatenate([F, number[F][:, ::-1]]),
-        np.concatenate([surface.patch_of_face, surface.patch_of_face + len(surface.patches)]),
-        (*surface.patches, *below),
+        np.concatenate([surface.patch_of_face, surface.patch_of_face + len(patches)]),
+        (*patches, *below),
         np.concatenate([surface.pinned, np.zeros(len(free), dtype=bool)]),
         plane=surface.plane,
         on_planes=tuple((plane, np.concatenate([on, on[inner]])) for plane, on in surface.on_planes),
@@ -153,14 +149,11 @@ def _with_sheet_below(surface: Surface, factor: float) -> Surface:
 
 
 def _supports(draft: Draft) -> tuple[Bools, Bools]:
-    """(n,) fixed and sliding vertices."""
     fixed, sliding = np.zeros((2, len(draft.mesh.points)), dtype=bool)
-    fixed[draft.edges.vertices("fixed", "held", "inside")] = True
+    lines = [c.vertices for c in draft.drawn.chains if draft.lines[c.line].kind is Kind.SUPPORT]
+    for vertices in (draft.edges.vertices("fixed", "held", "inside"), draft.drawn.required, *lines):
+        fixed[vertices] = True
     sliding[draft.edges.vertices("sliding")] = True
-    for chain in draft.drawn.chains:
-        if draft.lines[chain.line].kind is Kind.SUPPORT:
-            fixed[chain.vertices] = True
-    fixed[draft.drawn.required] = True
     return fixed, sliding & ~fixed
 
 
@@ -184,32 +177,29 @@ def _warn_of_free_edges(draft: Draft, held: Bools) -> None:
         free = [v for v in dict.fromkeys(chosen[:, 0].tolist()) if not held[v]]
         if not free:
             continue
-        if plan.tension is not None and plan.pressure:  # an edge with a cable closes no space for a pressure
-            at_one = usual_cable(replace(plan, tension=1.0))
-            keys = f'edge = "cable", cable = {at_one:g}, tension = 1.0, pressure = 0.0'
-        else:
-            pressed = any(patch.pressure for patch in plan.patches)
-            keys = f'edge = "cable", cable = {usual_cable(plan):g}'
-            keys += ", and pressure = 0.0 of its patches" if pressed else ""
-        place = point_text(draft.drawn.points[free[0]])
+        whole = plan.tension is not None and bool(plan.pressure)
+        more = ", tension = 1.0, pressure = 0.0" if whole else ""  # with a cable it closes no space
+        more += ", and pressure = 0.0 of its patches" if any(patch.pressure for patch in plan.patches) else ""
+        cable = usual_cable(replace(plan, tension=1.0) if whole else plan)
         text = (
-            f"nothing holds {line.name} at {place} ({len(free)} such vertices): the tension has nothing to"
-            " pull against there, and there is probably no equilibrium; fix the edge, along a curve in space"
-            f" if it should be above the plane, or give it a cable: {keys}"
+            f"nothing holds {line.name} at {point_text(draft.drawn.points[free[0]])} ({len(free)} such"
+            " vertices): the tension has nothing to pull against there, and there is probably no equilibrium;"
+            " fix the edge, along a curve in space if it should be above the plane, or give it a cable:"
+            f' edge = "cable", cable = {cable:g}{more}'
         )
         warnings.warn(text, PlanWarning, stacklevel=4)
 
 
 def _cables(draft: Draft, held: Bools) -> list[Cable]:
-    """The cables of the edges, and those along dividers."""
     numbers = count(1)
     cables = edge_cables(draft.edges, held, numbers)
-    for number, divider in enumerate(draft.plan.dividers):
-        if divider.cable is not None:
-            named = divider.wall is None and not divider.name.startswith("divider ")
-            name = divider.name if named else f"cable {next(numbers)}"
-            along = [chain.edges for chain in draft.divider(number)[1]]
-            cables.append(Cable(name, divider.cable, np.concatenate(along), divider.cable_weight))
+    for number, d in enumerate(draft.plan.dividers):
+        if d.cable is not None:
+            named = d.wall is None and not d.name.startswith("divider ")
+            along = np.concatenate([chain.edges for chain in draft.divider(number)[1]])
+            cables.append(
+                Cable(d.name if named else f"cable {next(numbers)}", d.cable, along, d.cable_weight)
+            )
     return cables
 
 
@@ -237,14 +227,12 @@ def _patches(plan: Plan, mesh: PlanarMesh) -> tuple[list[Patch], Ints]:
         raise PlanError(problem, what="patches", found=len(specs), expected=parts)
     else:
         owner = np.argsort(np.lexsort(centroid.round(6).T[::-1]))
-    snows = [plan.snow if spec.snow is None else spec.snow for spec in specs]
-    loads = zip(specs, snows, strict=True)
+    loads = zip(specs, [plan.snow if spec.snow is None else spec.snow for spec in specs], strict=True)
     patches = [Patch(s.name, s.tension, s.pressure, weight=s.weight, snow=snow) for s, snow in loads]
     return patches, owner[mesh.region]
 
 
 def _located(specs: Sequence[PatchSpec], mesh: PlanarMesh, centroid: Floats) -> Ints:
-    """(p,) the patch that each part of the plan belongs to."""
     owner = np.full(len(centroid), -1)
     for number, spec in enumerate(specs):
         points = np.atleast_2d(np.array(spec.at, dtype=float))
@@ -293,10 +281,9 @@ def harmonic_heights(points: Floats, triangles: Ints, heights: Floats) -> Floats
     [0.0, 0.0, 3.0, 3.0, 1.5]
     """
     known = ~np.isnan(heights)
-    given = np.where(known, heights, 0.0)
-    if np.ptp(given[known]) == 0.0:
-        return np.full(len(points), given[known][0])
-    L = stiffness(points, triangles)
+    if np.ptp(heights[known]) == 0.0:
+        return np.full(len(points), heights[known][0])
+    L, given = stiffness(points, triangles), np.where(known, heights, 0.0)
     return _solve(L, -(L @ given), known) + given
 
 
@@ -315,17 +302,14 @@ def dome(points: Floats, triangles: Ints, held: Bools, rise: float | None = None
     radius = float(distance.max())
     rise = RISE * radius if rise is None else rise
     slope = max(SLOPE, SLOPE / RISE * rise / radius)
-    full = rise * (u / u.max()) ** FULLNESS
-    return np.clip(full, LEAST * slope * distance, slope * distance)
+    return np.clip(rise * (u / u.max()) ** FULLNESS, LEAST * slope * distance, slope * distance)
 
 
 def _solve(L: csr_array, load: Floats, known: Bools) -> Floats:
     """(n,) u with L u = load at the unknown vertices and u = 0 at the known ones."""
-    free = np.flatnonzero(~known)
-    u: Floats = np.zeros(len(load))
+    free, u = np.flatnonzero(~known), np.zeros(len(load))
     if len(free):
-        factor = splu(L[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A")
-        u[free] = factor.solve(load[free])
+        u[free] = splu(L[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A").solve(load[free])
     return u
 
 
@@ -334,17 +318,15 @@ def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) ->
 
     ``feet``: by the first two vertices of the upper edge of a wall, the vertices along its held bottom.
     """
-    curves = []
+    curves, edges = [], draft.edges
     supports = [PlanLine("support", Kind.SUPPORT, curve) for curve in draft.supports_on_edge]
-    edges = draft.edges
     fixed = dict(zip(map(tuple, edges.ends.tolist()), edges.among("fixed", "held", "inside"), strict=True))
     for chain in draft.drawn.chains:
         line = draft.lines[chain.line]
         if line.kind is Kind.DIVIDER:
             continue
         held = [line.kind is Kind.SUPPORT or fixed[tuple(ends)] for ends in chain.edges.tolist()]
-        turns = np.flatnonzero(np.diff([False, *held, False]))
-        for first, last in turns.reshape(-1, 2):  # stretches of fixed edges
+        for first, last in np.flatnonzero(np.diff([False, *held, False])).reshape(-1, 2):  # fixed stretches
             V, at = chain.vertices[first : last + 1], chain.at[first : last + 1]
             found = _on_curve(draft, line.curve, V, at, X)
             for support in supports if found is None else ():
@@ -353,22 +335,18 @@ def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) ->
                 if found is None and (np.diff(t[way]) > 0.0).all():
                     found = _on_curve(draft, support.curve, V[way], t[way], X)
             curves.append(found or HeldCurve(polyline(X[V]), V, np.arange(float(len(V)))))
-    down = np.diag([1.0, 1.0, 0.0])
     for chain in draft.drawn.chains:
-        foot = feet.get((int(chain.vertices[0]), int(chain.vertices[1])))
-        if foot is not None:
-            curve = draft.lines[chain.line].curve.mapped(down, np.zeros(3))
-            found = _on_curve(draft, curve, foot, chain.at, X)
-            curves += [found] if found else []
+        if (foot := feet.get((int(chain.vertices[0]), int(chain.vertices[1])))) is not None:
+            curve = draft.lines[chain.line].curve.mapped(np.diag([1.0, 1.0, 0.0]), np.zeros(3))
+            curves += filter(None, [_on_curve(draft, curve, foot, chain.at, X)])
     return curves
 
 
 def _on_curve(draft: Draft, curve: Curve, V: Ints, at: Floats, X: Floats) -> HeldCurve | None:
     """The vertices V (k,) of X (n,3) on a curve at parameters (k,); None if off it. Where lines meet, their
     common vertex may be a little beside one: a straight piece leads there."""
-    plane = draft.plan.plane
     part, t = curve.part(at[0], at[-1], at)
-    part = part.mapped(plane.axes.T, np.array(plane.point))
+    part = part.mapped(draft.plan.plane.axes.T, np.array(draft.plan.plane.point))
     there = part.at(t)
     away = np.linalg.norm(X[V] - there, axis=1)
     near = ON * bounding_size(X)

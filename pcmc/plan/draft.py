@@ -59,13 +59,11 @@ class Draft:
     @cached_property
     def radii(self) -> Floats:
         """2 A / L of each part of the plan, with its area A and the length L of its edge: R of a circle."""
-        mesh = self.mesh
-        sides = np.sort(mesh.triangles[:, SIDES].reshape(-1, 2), axis=1)
-        owned = np.column_stack([np.repeat(mesh.region, 3), sides])
+        region, points, triangles = self.mesh.region, self.mesh.points, self.mesh.triangles
+        owned = np.column_stack([np.repeat(region, 3), np.sort(triangles[:, SIDES].reshape(-1, 2), axis=1)])
         own, times = np.unique(owned, axis=0, return_counts=True)
-        own = own[times == 1]
-        length = np.bincount(own[:, 0], segment_lengths(mesh.points, own[:, 1:]))
-        return 2.0 * np.bincount(mesh.region, signed_areas(mesh.points, mesh.triangles)) / length
+        length = np.bincount(own[times == 1, 0], segment_lengths(points, own[times == 1, 1:]))
+        return 2.0 * np.bincount(region, signed_areas(points, triangles)) / length
 
 
 def drafted(plan: Plan) -> Draft:
@@ -94,13 +92,11 @@ def drafted(plan: Plan) -> Draft:
     return Draft(plan, lines, on_edge, drawn, mesh, boundary(plan, lines, on_edge, drawn))
 
 
-def part_count(plan: Plan) -> int:
-    """The number of parts into which the lines cut the plan, without its mesh; errors as in ``drafted``."""
-    return _part_count(plan, _arranged(plan)[2])
+def part_count(plan: Plan, drawn: Arrangement | None = None) -> int:
+    """The number of parts into which the lines cut the plan, without its mesh; errors as in ``drafted``.
 
-
-def _part_count(plan: Plan, drawn: Arrangement) -> int:
-    """By Euler's formula e - v + c for e chains between v vertices in c connected pieces, less the holes."""
+    By Euler's formula e - v + c for e chains between v vertices in c connected pieces, less the holes."""
+    drawn = drawn or _arranged(plan)[2]
     ends = np.array([chain.vertices[[0, -1]] for chain in drawn.chains])
     used, renumbered = np.unique(ends, return_inverse=True)
     pieces = components(renumbered.reshape(-1, 2), len(used))
@@ -126,9 +122,8 @@ def _arranged(plan: Plan) -> tuple[list[PlanLine], list[Curve], Arrangement]:
     named = [np.array([*point, np.nan]) for point in plan.points.values()]  # vertices, but not held
     cut = [*on_edge, *(c.local(plan.plane) for c in (*(part.curve for part in plan.cables), *plan.mirrors))]
     cut_points = np.concatenate([np.zeros((0, 2)), *(c.at([0.0, len(c.pieces)])[:, :2] for c in cut)])
-    required = np.reshape([*points, *named], (-1, 3)).astype(float)
-    drawn = arrange(lines, plan.edge_length, required, cut_points)
-    check_count("patches", _part_count(plan, drawn))
+    drawn = arrange(lines, plan.edge_length, np.reshape([*points, *named], (-1, 3)).astype(float), cut_points)
+    check_count("patches", part_count(plan, drawn))
     return lines, on_edge, replace(drawn, required=drawn.required[: len(points)])
 
 
@@ -248,12 +243,11 @@ def _beside(draft: Draft, chains: Sequence[Ints]) -> Ints:
 
 def _balanced(draft: Draft, roof: Roof, number: int, beside: Sequence[Ints]) -> float:
     """A tension with which all junctions of a divider balance; ``beside`` are the triangles at each."""
-    line, _ = draft.divider(number)
-    net = np.abs(roof.laws[:, 0] - roof.laws[:, 1])
-    pressure = min(float(net[faces].min(initial=np.inf)) for faces in beside)
-    width = float(draft.radii[draft.mesh.region[np.concatenate(beside)]].min())
-    most = most_in_corners(line.curve, draft.lines[0], draft.plan.edge_length, pressure)
-    tensions = [roof.laws[faces, 2].tolist() for faces in beside]
+    faces, curve = np.concatenate(beside), draft.divider(number)[0].curve
+    pressure = float(np.abs(roof.laws[faces, 0] - roof.laws[faces, 1]).min(initial=np.inf))
+    most = most_in_corners(curve, draft.lines[0], draft.plan.edge_length, pressure)
+    width = float(draft.radii[draft.mesh.region[faces]].min())
+    tensions = [roof.laws[own, 2].tolist() for own in beside]
     if draft.plan.dividers[number].upright:  # its plane takes the difference
         tensions = [[min(part)] for part in tensions]
     return balanced_wall(tensions, min(most, SHARE * pressure * width) or np.inf)
@@ -271,8 +265,7 @@ def most_in_corners(curve: Curve, outline: PlanLine, edge_length: float, pressur
     for one in () if curve.closed or not len(corners) else (curve, curve.reversed()):
         away = one.at(one.parameter(np.array([0.0, WEDGE * edge_length])))[:, :2]
         width = float(outline.tree.query_nearest(shapely.Point(away[1]), return_distance=True)[1][0])
-        in_corner = np.linalg.norm(corners - away[0], axis=1).min() <= near
-        if in_corner and width < NARROW * WEDGE * edge_length:
+        if np.linalg.norm(corners - away[0], axis=1).min() <= near and width < NARROW * WEDGE * edge_length:
             most = min(most, CORNER_SHARE * pressure * width)
     return most
 
@@ -304,6 +297,5 @@ def rooms_between(plan: Plan, walls: Sequence[Patch], sides: Sequence[Sides]) ->
     for number, (name, room) in enumerate(plan.rooms.items()):
         signs = [(s.left == number) - (s.right == number) for s in sides]
         between = {wall.name: sign for wall, sign in zip(walls, signs, strict=True) if sign}
-        around = dict.fromkeys(room.patches, 1) | between
-        rooms.append(Room(name, tuple(around.items()), room.volume))
+        rooms.append(Room(name, tuple((dict.fromkeys(room.patches, 1) | between).items()), room.volume))
     return rooms

@@ -21,21 +21,11 @@ from ..base.units import conversion_note, unlikely_size
 from ..surface.curves import Curve, polyline
 from ..surface.parts import listed
 from ..surface.pieces import Piece, point_text, two_digits
+from . import strokes as reading
 from .lines import Kind, LineTree, PlanLine, check_line
 from .parts import check_count, hole_label
 from .paths import JoinedPath, join_strokes, meet_edges, meet_lines
-from .strokes import (
-    UNDERSTOOD,
-    Label,
-    Layer,
-    Stroke,
-    Strokes,
-    heights_of,
-    labels_of,
-    layer_of,
-    left_out,
-    read_strokes,
-)
+from .strokes import Label, Layer, Stroke, Strokes, layer_of, left_out, read_strokes
 
 GAP = 1e-3  # of the diagonal of the outline: gaps up to this are closed
 MOST_GAP = 0.05  # of the diagonal: a wider gap is a part that is missing
@@ -108,21 +98,18 @@ class _Reader:
         self.level = float(points[0, 2]) if np.ptp(points[:, 2]) <= ON * self.size else 0.0
 
     def layers_of(self, role: str) -> list[tuple[Layer, list[Stroke]]]:
-        """The layers of a role with their strokes."""
         parsed = [(layer_of(name), strokes) for name, strokes in self.by_layer.items()]
         return [(layer, strokes) for layer, strokes in parsed if layer is not None and layer.role == role]
 
     def _no_outline(self) -> PlanError:
         """The error of a drawing without an outline: what it has instead."""
         counts = {name: len(strokes) for name, strokes in self.by_layer.items()}
-        others = Counter[str]()
-        for kinds in self.content.others.values():
-            others.update(kinds)
-        hidden = sum(self.content.hidden.values())
+        others = sum(map(Counter, self.content.others.values()), Counter[str]())
         if not counts and others:
             only = listed([f"{count} {kind}" for kind, count in others.items()])
             text = f"has no lines, only {only}; draw those of the plan, the edge on a layer 'outline'"
         elif not counts:
+            hidden = sum(self.content.hidden.values())
             shown = f"shows nothing: its {hidden} entities are on layers turned off" if hidden else "is empty"
             text = f"{shown}; draw the edge of the roof on a layer 'outline'"
         else:
@@ -130,10 +117,9 @@ class _Reader:
             why = left_out(strange) if strange else f"all are on {listed(list(map(repr, counts)))}"
             why += "" if strange else "; draw the whole edge of the roof on 'outline', too"
             text = f"has no curve on a layer 'outline'; {why}"
-        return PlanError(text, what="outline", found=counts, expected=UNDERSTOOD)
+        return PlanError(text, what="outline", found=counts, expected=reading.UNDERSTOOD)
 
     def drawing(self, path: Path) -> Drawing:
-        """All parts, each checked."""
         loops = self._loops(self.edge)
         if len(loops) > 1:
             ends = ", ".join(f"{listed(loop.labels)} at {point_text(loop.ends[0])}" for loop in loops[:3])
@@ -169,32 +155,20 @@ class _Reader:
                 raise PlanError(text, what=name, where=error.where, found=error.found) from None
         loose = self._loose(outline, places[: len(drawn)], places[len(drawn) :], bool(cables))
         texts = [stroke for _, strokes in self.layers_of("height") for stroke in strokes]
-        heights = heights_of(texts, self.content.unit, self.units)
-        labels = labels_of(self.layers_of("patch"))
+        heights = reading.heights_of(texts, self.content.unit, self.units)
+        labels = reading.labels_of(self.layers_of("patch"))
         self._note_rest(outline)
-        return Drawing(
-            path=path,
-            unit=self.content.unit,
-            units=self.units,
-            outline=self._on_plane(outline),
-            dividers={name: _projected(curve) for name, curve in dividers.items()},
-            holes={name: self._on_plane(curve) for name, curve in holes.items()},
-            supports=[s if isinstance(s, np.ndarray) else self._on_plane(s) for s in places],
-            heights=heights,
-            labels=labels,
-            level=self.level,
-            gap=self.gap,
-            layers=self.layers,
-            upright=upright,
-            ridges=ridges,
-            cables={name: _projected(curve) for name, curve in cables.items()},
-            mirrors=[_projected(curve) for curve in mirrors.values()],
-            loose=loose,
-            notes=tuple(self.notes),
-        )
+        parts: dict[str, Any] = {"outline": self._on_plane(outline), "upright": upright, "ridges": ridges}
+        parts["dividers"] = {name: _projected(curve) for name, curve in dividers.items()}
+        parts["cables"] = {name: _projected(curve) for name, curve in cables.items()}
+        parts["mirrors"] = [_projected(curve) for curve in mirrors.values()]
+        parts["holes"] = {name: self._on_plane(curve) for name, curve in holes.items()}
+        parts["supports"] = [s if isinstance(s, np.ndarray) else self._on_plane(s) for s in places]
+        parts |= {"heights": heights, "labels": labels, "layers": self.layers, "loose": loose}
+        parts |= {"level": self.level, "gap": self.gap, "notes": tuple(self.notes)}
+        return Drawing(path, self.content.unit, self.units, **parts)
 
     def _joined(self, strokes: Sequence[Stroke]) -> list[JoinedPath]:
-        """The paths of a layer; what was changed is noted."""
         paths, notes = join_strokes(strokes, self.gap)
         self.notes += notes
         return paths
@@ -207,10 +181,10 @@ class _Reader:
             raise PlanError(f"{where} has no curve; draw a closed one", what=where)
         open_paths = [path for path in paths if not path.curve.closed]
         if open_paths and len(open_paths) < len(paths):
-            stray = open_paths[0]
-            text = f"{stray.source} from {point_text(stray.ends[0])} to {point_text(stray.ends[1])} is no"
-            text += " part of the closed curve there; delete it, or put it on the layer of what it is"
-            raise PlanError(text, what=where, where=_plain(stray.ends[0]))
+            first, last = open_paths[0].ends
+            text = f"{open_paths[0].source} from {point_text(first)} to {point_text(last)} is no part of the"
+            text += " closed curve there; delete it, or put it on the layer of what it is"
+            raise PlanError(text, what=where, where=_plain(first))
         for path in open_paths:
             for end, count in zip(path.ends, path.strokes_at_ends, strict=True):
                 if count > 2:
@@ -219,12 +193,12 @@ class _Reader:
                     raise PlanError(text, what=where, where=_plain(end))
         if open_paths:  # the smallest gap between two of the ends
             ends = [(path.labels[-k], point) for path in open_paths for k, point in enumerate(path.ends)]
-            points = np.array([point for _, point in ends])
+            points = [point for _, point in ends]
             apart, nearest = (np.ravel(found) for found in cKDTree(points).query(points, k=[2]))
             place = int(np.argmin(apart))
             one, two = (ends[k] for k in sorted((place, int(nearest[place]))))
-            gap = float(apart[place])
             between = f"between {one[0]} at {point_text(one[1])} and {two[0]} at {point_text(two[1])}"
+            gap = float(apart[place])
             enough = two_digits(gap, math.ceil)
             allow = f", or close it: gap = {enough:g} in [plan], pcmc plan --gap {enough:g}"
             if enough > MOST_GAP * self.size:
@@ -242,20 +216,17 @@ class _Reader:
         paths_of: Callable[[Sequence[Stroke]], list[JoinedPath]] | None = None,
     ) -> list[str]:
         """Add the paths of a role's layers to ``curves`` by the layer's name, or numbered; the new names."""
-        new = []
+        before = len(curves)
         for layer, strokes in self.layers_of(role):
             paths = (paths_of or self._joined)(strokes)
-            names = [layer.name] if layer.name and len(paths) == 1 and layer.name not in curves else []
-            numbers = (f"{layer.name or usual} {k}" for k in itertools.count(1))
-            names += itertools.islice((n for n in numbers if n not in curves), len(paths) - len(names))
-            for name, path in zip(names, paths, strict=True):
-                curves[name] = path.curve
-                self.layers[label(name)] = path.source
-            new += names
-        return new
+            own = [layer.name] if layer.name and len(paths) == 1 else []
+            names = itertools.chain(own, (f"{layer.name or usual} {k}" for k in itertools.count(1)))
+            for path in paths:
+                name = next(name for name in names if name not in curves)
+                curves[name], self.layers[label(name)] = path.curve, path.source
+        return list(curves)[before:]
 
     def _masts(self, holes: dict[str, Curve]) -> list[Floats]:
-        """The tops of masts; rings are added to the holes."""
         tops: list[Floats] = []
 
         def rings(strokes: Sequence[Stroke]) -> list[JoinedPath]:
@@ -282,22 +253,19 @@ class _Reader:
         free = self._add("free", "cable {!r}".format, "free", cables)
         check_count("cables", len(cables))
         tree = LineTree([PlanLine("an edge", Kind.OUTLINE, edge) for edge in edges])
-        across = {
-            name: curve
-            for name, curve in cables.items()
-            if tree.leaves(curve, ALONG * self.size, self.gap) is not None
-        }
+        leaves = {n: tree.leaves(c, ALONG * self.size, self.gap) is not None for n, c in cables.items()}
         for name in free:
-            if name in across:
+            if leaves[name]:
                 where = self.layers[f"cable {name!r}"]
                 text = f"{where} is on no edge of the outline or of a hole; draw it along one, or across the"
                 raise PlanError(f"{text} roof on a layer 'cable NAME'", what=where)
+        across = {name: cables.pop(name) for name, away in leaves.items() if away}
         self.layers |= {f"divider {name!r}": self.layers[f"cable {name!r}"] for name in across}
-        return across, {name: curve for name, curve in cables.items() if name not in across}
+        return across, cables
 
     def _mirrors(self) -> dict[str, Curve]:
         """The straight lines of mirrors, numbered; those that go on in one direction are one."""
-        mirrors: list[Floats] = []
+        mirrors = list[Floats]()
         for path in (path for _, strokes in self.layers_of("mirror") for path in self._joined(strokes)):
             begin = len(mirrors)
             for piece in path.curve.pieces:
@@ -306,9 +274,8 @@ class _Reader:
                     text = f"{path.source} is not straight; a mirror is a straight edge of the outline"
                     raise PlanError(text, what=f"layer {path.layer!r}", where=_plain(start))
                 if len(mirrors) > begin and polyline([mirrors[-1][0], start, end]).corners.size == 0:
-                    mirrors[-1] = np.stack([mirrors[-1][0], end])
-                else:
-                    mirrors.append(np.stack([start, end]))
+                    start = mirrors.pop()[0]
+                mirrors.append(np.stack([start, end]))
                 self.layers[f"mirror {len(mirrors)}"] = path.source
         return {f"mirror {k}": polyline(ends) for k, ends in enumerate(mirrors, 1)}
 
@@ -352,16 +319,15 @@ class _Reader:
             self.notes.append(left_out(strange))
         for layer, kinds in self.content.others.items():
             if layer_of(layer) is not None:
-                kinds_text = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
-                self.notes.append(f"layer {layer!r}: no lines, left out: {kinds_text}")
+                counts = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+                self.notes.append(f"layer {layer!r}: no lines, left out: {counts}")
         hidden = [f"{name!r} ({n})" for name, n in self.content.hidden.items() if layer_of(name) is not None]
         if hidden:
             self.notes.append(f"hidden, left out: entities of the layers {', '.join(hidden)}")
         width = float(np.ptp(outline.at(outline.dense), axis=0)[:2].max())
-        note = unlikely_size(width, self.units, self.content.unit)
-        self.notes += [note] if note else []
-        if note := self.content.note or conversion_note(self.content.unit, self.units):
-            self.notes.insert(0, note)
+        first = self.content.note or conversion_note(self.content.unit, self.units)
+        last = unlikely_size(width, self.units, self.content.unit)
+        self.notes = [*filter(None, [first, *self.notes, last])]
 
     def _on_plane(self, curve: Curve) -> Curve:
         """The curve as a plane one if all of it is at the level of Π."""

@@ -66,8 +66,7 @@ def boundary(plan: Plan, lines: Sequence[PlanLine], on_edge: Sequence[Curve], dr
         along = _along(part.curve.local(plan.plane), drawn.points, ends, SNAP * plan.edge_length)
         if not along.any():
             name = cable_label(part, number)
-            problem = f"{name} is on no edge of the outline or of a hole; draw it along one"
-            raise PlanError(problem, what=name)
+            raise PlanError(f"{name} is on no edge of the outline or of a hole; draw it along one", what=name)
         state[along], cable[along] = "cable", len(cables)
         cables.append((part.tension, part.weight, part.name))
     supported = np.zeros(len(ends), dtype=bool)
@@ -130,8 +129,7 @@ def _mirror_distances(plan: Plan, points: Floats) -> list[Floats]:
 
 def mirror_planes(plan: Plan, vertices: Floats) -> list[tuple[Plane, Bools]]:
     """The plane of each mirror, across Π, and the (n,) mask of the vertices in it."""
-    planes = []
-    distances = _mirror_distances(plan, plan.plane.to_local(vertices)[:, :2])
+    planes, distances = [], _mirror_distances(plan, plan.plane.to_local(vertices)[:, :2])
     for number, (mirror, distance) in enumerate(zip(plan.mirrors, distances, strict=True), start=1):
         a, b = mirror.local(plan.plane).at([0.0, 1.0])
         middle = to_space(((a + b) / 2.0 * [1.0, 1.0, 0.0])[None], plan.plane)[0]
@@ -145,11 +143,10 @@ def edge_cables(edges: Boundary, held: Bools, numbers: count[int]) -> list[Cable
     """A Cable for each stretch of the boundary between held vertices; ``numbers`` those without a name."""
     cables = []
     for index, (tension, weight, name) in enumerate(edges.cables):
-        chosen = edges.cable == index
-        ends, line = edges.ends[chosen], edges.line[chosen]
+        ends, line = edges.ends[edges.cable == index], edges.line[edges.cable == index]
         new = held[ends[:, 0]] | (ends[:, 0] != np.roll(ends[:, 1], 1)) | (line != np.roll(line, 1))
-        group = np.cumsum(new) - 1  # the first edges go on from the last
-        group = np.maximum(np.where(group < 0, group.max(initial=0), group), 0)
+        group = np.cumsum(new)
+        group[group == 0] = group.max(initial=0)  # the first edges go on from the last
         stretches = [ends[group == k] for k in np.unique(group)]
         for k, stretch in enumerate(stretches, start=1):
             own = f"cable {next(numbers)}" if not name else f"{name}-{k}" if len(stretches) > 1 else name
@@ -182,9 +179,8 @@ def cable_for(outline: Curve, tension: float, supports: Sequence[Any]) -> float:
     radius = 1.5 * size
     points = np.array([p[:2] for p in supports], dtype=float).reshape(-1, 2)
     t, away = PlanLine("the outline", Kind.OUTLINE, outline).nearest(points)
-    on = np.flatnonzero(away <= ON * size)
-    if len(on) > 2:
-        corners = points[on[np.argsort(t[on])]]
+    if (away <= ON * size).sum() > 2:
+        corners = points[[k for k in np.argsort(t) if away[k] <= ON * size]]
         before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
         angle = np.radians(angles(np.stack([before, corners, after], axis=1))[:, 1])
         longer = np.maximum(*(np.linalg.norm(other - corners, axis=1) for other in (before, after)))
@@ -214,8 +210,8 @@ def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools)
             vertices, dimension = np.array([next(required)]), len(support)
             given = to_local(np.array([support]), plan.plane)[:, 2]
         if dimension == 2:
-            given = given[np.isin(vertices, inside)]
-            vertices = vertices[np.isin(vertices, inside)]
+            own = np.isin(vertices, inside)
+            given, vertices = given[own], vertices[own]
         heights[vertices] = np.where(np.isnan(heights[vertices]), given, heights[vertices])
         steps = given - heights[vertices]
         wrong = np.flatnonzero((np.abs(steps) > ON * size) & ~np.isin(vertices, loose))
@@ -231,8 +227,7 @@ def raised_heights(plan: Plan, edges: Boundary, drawn: Arrangement, held: Bools)
         at, vertices = np.cumsum(lengths) - lengths, ring[:, 0]
         known = held[vertices]
         if known.any():
-            period = float(lengths.sum())
-            heights[vertices] += np.interp(at, at[known], change[vertices[known]], period=period)
+            heights[vertices] += np.interp(at, at[known], change[vertices[known]], period=lengths.sum())
     heights[inside[~held[inside]]] = np.nan
     return heights
 
@@ -242,8 +237,8 @@ def check_pressures(edges: Boundary, triangles: Ints, patch: Ints, patches: Sequ
     beside = (edge_places(triangles[:, SIDES], edges.ends[edges.cable != NONE]) >= 0).any(axis=1)
     for k in np.unique(patch[beside]):
         for key, instead in (("pressure", "pressure = 0 (and a weight)"), ("snow", "a weight in its place")):
-            name, value = patches[k].name, getattr(patches[k], key)
-            if value != 0.0:
+            if (value := getattr(patches[k], key)) != 0.0:
+                name = patches[k].name
                 problem = f"patch {name!r} has the {key} {value:g} and a free edge with a cable, which closes"
                 problem += f" no space for it; give the patch {instead}, or hold that edge"
                 raise PlanError(problem, what=key, where=name, found=value)

@@ -96,17 +96,15 @@ class PlanLine:
         for width in () if self.straight else 2.0 / 64.0 / 16.0 ** np.arange(8):
             trial = np.clip(t[:, None] + width * trials, 0.0, last)  # narrows the bracket 16 times
             at = self.curve.at(trial.ravel())[:, :2].reshape(*trial.shape, 2)
-            best = np.argmin(np.linalg.norm(at - xy[:, None], axis=2), axis=1)
-            t = trial[np.arange(len(t)), best]
+            t = trial[np.arange(len(t)), np.argmin(np.linalg.norm(at - xy[:, None], axis=2), axis=1)]
         return t, np.linalg.norm(self.curve.at(t)[:, :2] - xy, axis=1)
 
 
 def is_straight(curve: Curve, tolerance: float) -> bool:
     """Whether a curve on Π is a straight line from its start to its end, to ``tolerance``."""
-    along = curve.at(curve.dense)[:, :2]
-    way = along[-1] - along[0]
-    length = float(np.linalg.norm(way)) or 1.0
-    return not curve.closed and bool((np.abs(cross_2d(way, along - along[0])) <= tolerance * length).all())
+    along = curve.at(curve.dense)[:, :2] - curve.at(0.0)[:, :2]
+    most = tolerance * (float(np.linalg.norm(along[-1])) or 1.0)
+    return not curve.closed and bool((np.abs(cross_2d(along[-1], along)) <= most).all())
 
 
 class LineTree:
@@ -146,8 +144,7 @@ class LineTree:
     @cached_property
     def area(self) -> Any:
         """The polygon inside the outline and outside all holes."""
-        holes = [line.xy for line in self.lines if line.kind is Kind.HOLE]
-        area = shapely.Polygon(self.lines[0].xy, holes)
+        area = shapely.Polygon(self.lines[0].xy, [line.xy for line in self.lines if line.kind is Kind.HOLE])
         shapely.prepare(area)
         return area
 
@@ -173,11 +170,8 @@ class LineTree:
             start, end = np.array(part.coords)[[0, -1]]
             if part.geom_type != "Point":
                 raise overlap(two, one, f"from {point_text(start)} to {point_text(end)}")
-            nearest = (
-                line.nearest_to(start[None], self.chord[[k]])[0]
-                for line, k in zip((one, two), pair, strict=True)
-            )
-            s, t = (float(t[0]) for t in nearest)
+            chords = zip((one, two), pair, strict=True)
+            s, t = (float(line.nearest_to(start[None], self.chord[[k]])[0][0]) for line, k in chords)
             s, t = (s, t) if one.straight and two.straight else crossing(one, s, two, t)
             places.append([(i, s), (j, t)])
         return places
@@ -221,8 +215,8 @@ def check_holes(lines: Sequence[PlanLine]) -> None:
         raise holes[place].error(f"{where} the outline; a hole must be inside the outline")
     i, j = shapely.STRtree(areas).query(areas, predicate="intersects")
     for first, second in zip(i[i < j], j[i < j], strict=True):
-        problem = f"and {holes[second].name} touch or overlap; join them into one"
-        raise holes[first].error(problem, found=holes[second].name)
+        other = holes[second].name
+        raise holes[first].error(f"and {other} touch or overlap; join them into one", found=other)
 
 
 def crossing(one: PlanLine, s: float, two: PlanLine, t: float) -> tuple[float, float]:
@@ -238,9 +232,8 @@ def crossing(one: PlanLine, s: float, two: PlanLine, t: float) -> tuple[float, f
         turn = float(cross_2d(along_s, along_t))
         if abs(turn) < 1e-9 * float(np.linalg.norm(along_s) * np.linalg.norm(along_t)):
             break
-        new_s, new_t = (s + float(cross_2d(gap, along_t)) / turn, t + float(cross_2d(gap, along_s)) / turn)
-        new_s = min(max(new_s, 0.0), float(len(one.curve.pieces)))
-        new_t = min(max(new_t, 0.0), float(len(two.curve.pieces)))
+        new_s = min(max(s + float(cross_2d(gap, along_t)) / turn, 0.0), float(len(one.curve.pieces)))
+        new_t = min(max(t + float(cross_2d(gap, along_s)) / turn, 0.0), float(len(two.curve.pieces)))
         new_gap = apart(new_s, new_t)
         if np.linalg.norm(new_gap) >= np.linalg.norm(gap):
             break

@@ -18,8 +18,8 @@ from ..surface.curves import Curve
 BOTTOMS = ("sliding", "held", "sloped")
 WALL = 'a number, "balanced" or false'  # what a wall's tension may be
 BALANCED = "balanced"  # in place of a wall's tension: chosen from those of its neighbours
+# how many of its parts a plan may have; its dividers cut it into no more parts than patches
 MOST = {"dividers": 1000, "holes": 2000, "cables": 2000, "mirrors": 100, "supports": 10_000, "patches": 2000}
-"""How many of its parts a plan may have; its dividers cut it into no more parts than patches."""
 
 
 def check_count(key: str, count: int, kind: type[PcmcError] = PlanError) -> None:
@@ -199,8 +199,7 @@ def curve_of(spec: Any, what: str, closed: bool = False) -> Curve:
     try:
         return curve(spec, closed=closed)
     except OptionError as error:
-        details = {"where": error.where, "found": error.found, "expected": error.expected}
-        raise OptionError(f"{what}: {error}", what=what, **details) from None
+        raise error.in_file(what, what=what) from None
 
 
 def divider_of(spec: Any, number: int) -> Divider:
@@ -229,8 +228,7 @@ def hole_of(spec: Any, number: int) -> Hole:
     part = _part_of(Hole, spec, what)
     validate.choice(f"edge of {what}", part.edge, EDGES)
     name = hole_label(part.name) if checked_name(f"{what}.name", part.name, empty=True) else what
-    curve = curve_of(part.curve, what, closed=True)
-    return replace(part, curve=curve, name=name, **edge_cable(part, name))
+    return replace(part, curve=curve_of(part.curve, what, closed=True), name=name, **edge_cable(part, name))
 
 
 def hole_label(name: str) -> str:
@@ -244,18 +242,16 @@ def hole_label(name: str) -> str:
 
 def edge_cable(part: Any, what: str) -> dict[str, Any]:
     """The cable along the edge of a plan or a hole; refused without ``edge = "cable"``, missing with it."""
-    edge, cable = part.edge, part.cable
-    if edge == "cable" and cable is None:
+    if part.edge == "cable" and part.cable is None:
         message = f'{what}: edge = "cable" needs the tension of the cable, such as cable = 10.0'
         raise OptionError(message, what="cable", where=what)
-    if edge != "cable" and cable is not None:
-        message = f'{what}: cable = {validate.shown(cable)} needs edge = "cable", found "{edge}"'
-        raise OptionError(message, what="edge", where=what, found=edge, expected="cable")
+    if part.edge != "cable" and part.cable is not None:
+        message = f'{what}: cable = {validate.shown(part.cable)} needs edge = "cable", found "{part.edge}"'
+        raise OptionError(message, what="edge", where=what, found=part.edge, expected="cable")
     return _cable(part, what)
 
 
 def _cable(part: Any, what: str) -> dict[str, Any]:
-    """The tension and the weight of the cable along a line, checked."""
     given, weight = part.cable, validate.number("cable_weight", part.cable_weight, where=what)
     cable = None if given is None else validate.number("cable", given, least=0.0, where=what)
     if weight and not cable:
@@ -301,11 +297,11 @@ def rooms_of(spec: Any, patches: Sequence[PatchSpec], given: Any = ()) -> dict[s
     rooms = {a.name: RoomData((a.name,), a.volume) for a in patches if a.volume is not None}
     if not isinstance(spec, Mapping | None) and not (isinstance(spec, tuple) and not spec):
         validate.refuse("rooms", spec, "a mapping from names to patches and a volume")
+    known = [patch.name for patch in patches]
     for name, room in (spec or {}).items():
         values = vars(room) if isinstance(room, RoomData) else room
         check_keys(values, RoomData, f"room {name!r}", ("patches", "volume"), name)
         volume = validate.number("volume", values["volume"], where=name)
-        known = [patch.name for patch in patches]
         over = tuple(validate.choice(f"room {name!r}: patch", p, known) for p in values["patches"])
         if rooms.setdefault(name, RoomData(over, volume)) != RoomData(over, volume):
             raise OptionError(f"room {name!r} has two volumes; give one", what="volume", where=name)
@@ -339,11 +335,9 @@ def patches_of(spec: Any) -> tuple[PatchSpec, ...]:
         if not all(isinstance(one, PatchSpec) for one in spec):
             validate.refuse("patches", spec, "PatchSpecs, or a mapping from names to their attributes")
         return tuple(spec)
-    patches = []
     for name, values in spec.items():
         check_keys(values, PatchSpec, f"patch {name!r}", ("a tension",), name)
-        patches.append(PatchSpec(name, **values))
-    return tuple(patches)
+    return tuple(PatchSpec(name, **values) for name, values in spec.items())
 
 
 def support_from(spec: Any, number: int) -> Any:
@@ -360,12 +354,11 @@ def points_of(spec: Any) -> dict[str, tuple[float, float]]:
     """Named points of the plan, by name."""
     if not isinstance(spec, Mapping):
         validate.refuse("points", spec, "a table of names and points [x, y]")
-    points = {}
+    points: dict[str, Any] = {}
     for name, point in spec.items():
         if not isinstance(point, Sequence | np.ndarray) or isinstance(point, str) or len(point) != 2:
             validate.refuse("points", point, "a point [x, y]", name)
-        x, y = (validate.number(axis, value, where=name) for axis, value in zip("xy", point, strict=True))
-        points[name] = (x, y)
+        points[name] = tuple(validate.number(k, v, where=name) for k, v in zip("xy", point, strict=True))
     return points
 
 

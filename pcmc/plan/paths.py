@@ -54,17 +54,16 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Join
     >>> path.curve.closed, notes
     (True, ["layer 'outline': 1 gap closed, up to 0.001 long (closed are gaps up to 0.01)"])
     """
-    drawn = [stroke for stroke in strokes if stroke.curve is not None]
-    curves = [stroke.curve for stroke in strokes if stroke.curve is not None]
+    drawn = [(stroke.curve, stroke.label) for stroke in strokes if stroke.curve is not None]
     if not drawn:
         return [], []
-    layer, single = drawn[0].layer, _single(curves, tolerance)
-    curves, labels = list(compress(curves, single)), [stroke.label for stroke in compress(drawn, single)]
-    doubles = [stroke.label for stroke, alone in zip(drawn, single, strict=True) if not alone]
+    layer, single = strokes[0].layer, _single([curve for curve, _ in drawn], tolerance)
+    doubles = [label for (_, label), alone in zip(drawn, single, strict=True) if not alone]
     doubled = f"layer {layer!r}: drawn twice or without length, left out: {listed(doubles)}"
-    notes = [doubled] if doubles else []
-    if not curves:
+    notes, kept = [doubled] if doubles else [], list(compress(drawn, single))
+    if not kept:
         return [], notes
+    curves, labels = zip(*kept, strict=True)
     ends = np.concatenate([_ends(curve) for curve in curves])
     node = components(cKDTree(ends).query_pairs(tolerance, output_type="ndarray"), len(ends))
     count = int(node.max()) + 1
@@ -92,7 +91,6 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Join
 
 
 def _ends(curve: Curve) -> Floats:
-    """(2,3) the first and the last point."""
     return curve.at([0.0, float(len(curve.pieces))])
 
 
@@ -120,20 +118,20 @@ def _walk(curves: Sequence[Curve], layer: str, labels: Sequence[str], nodes: Int
     left, paths = set(range(len(curves))), []
     for begin in (*(node for node in at_node if count[node] != 2), *at_node):
         for start in at_node[begin]:
-            node, names, following = begin, [], [start] if start in left else []
-            pieces: list[Piece] = []
+            node, following = begin, [start] if start in left else []
+            pieces, names = list[Piece](), dict[str, None]()
             while following:
                 k = following[0]
                 left.discard(k)
                 forward = nodes[k, 0] == node
                 pieces += (curves[k] if forward else curves[k].reversed()).pieces
-                names.append(labels[k])
-                node = int(nodes[k, 1] if forward else nodes[k, 0])
+                names[labels[k]] = None
+                node = int(nodes[k, int(forward)])
                 goes_on = node != begin and count[node] == 2
                 following = [other for other in at_node[node] if other in left] if goes_on else []
             if pieces:
-                path, once = Curve(tuple(pieces), closed=node == begin), tuple(dict.fromkeys(names))
-                paths.append(JoinedPath(path, layer, once, (count[begin], count[node])))
+                path = Curve(tuple(pieces), closed=node == begin)
+                paths.append(JoinedPath(path, layer, tuple(names), (count[begin], count[node])))
     return paths
 
 

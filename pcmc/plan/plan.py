@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
+from ..base.arrays import toml
 from ..base.errors import OptionError
 from ..base.libraries import require
 from ..base.validate import checked_name
@@ -72,17 +73,13 @@ class Plan:
 
     Raises
     ------
-    OptionError
-        For a value that an attribute may not have.
-    MissingExtra
-        From ``surface``, without the library shapely.
-    PlanError
-        From ``surface``, if the lines do not divide the plan properly; names the line.
+    OptionError : for a value that an attribute may not have.
+    MissingExtra : from ``surface``, without the library shapely.
+    PlanError : from ``surface``, if the lines do not divide the plan properly; names the line.
 
     Warns
     -----
-    PlanWarning
-        From ``surface``, if an edge is free and has no cable.
+    PlanWarning : from ``surface``, if an edge is free and has no cable.
 
     Examples
     --------
@@ -136,9 +133,8 @@ class Plan:
             object.__setattr__(self, key, value)
         for key in ("pressure", "weight", "snow"):
             validate.number(key, getattr(self, key))
-        validate.positive("edge_length", self.edge_length)
-        for key in ("rise", "cushion"):
-            if getattr(self, key) is not None:
+        for key in ("edge_length", "rise", "cushion"):
+            if key == "edge_length" or getattr(self, key) is not None:
                 validate.positive(key, getattr(self, key))
         if self.patches and self.tension is not None:
             problem = f"the plan has tension = {validate.shown(self.tension)} and patches with their own"
@@ -198,6 +194,43 @@ class Plan:
         from .build import build_surface  # a plan without its mesh does not need it
 
         return build_surface(self)
+
+
+@dataclass
+class Chosen:
+    """What neither a project nor its drawing says: tensions of patches, walls and cables, edge length."""
+
+    tensions: dict[str, float] = field(default_factory=dict)
+    walls: dict[str, float] = field(default_factory=dict)
+    edge_length: float | None = None
+    cables: dict[str, float] = field(default_factory=dict)  # that of the outline has no name
+
+    @property
+    def text(self) -> str:
+        """All of it in a line, with what to type to choose; empty if nothing was proposed.
+
+        >>> Chosen({"nave": 5.4}, {"chancel": 1.6}).text.split(" (")[0]
+        "chosen for what the project leaves open: tension 5.4 for 'nave'; wall 1.6 for 'chancel'"
+        """
+        named = next(iter(self.cables), "")  # the outline's cable has none
+        cable = "[[plan.cables]] name = {}, tension = ..." if named else "cable = ... under [plan]"
+        kinds = {
+            "tension": (self.tensions, "{} = {{tension = ...}} under [plan.patches]"),
+            "wall": (self.walls, "[[plan.dividers]] name = {}, wall = ..."),
+            "cable": (self.cables, cable),
+        }
+        parts, keys = [], []
+        for what, (values, key) in kinds.items():
+            groups: dict[float, list[str]] = {}  # the names of each value
+            for name, value in values.items():
+                groups.setdefault(value, []).append(repr(name) if name else "the outline")
+            parts += [f"{what} {value:g} for {', '.join(names)}" for value, names in groups.items()]
+            keys += [key.format(toml(name)) for name in list(values)[:1]]
+        if self.edge_length is not None:
+            parts.append(f"edges of {self.edge_length:g}")
+            keys.append("edge_length = ... under [plan]")
+        text = f"chosen for what the project leaves open: {'; '.join(parts)} (to change: {'; '.join(keys)})"
+        return text if parts else ""
 
 
 def patch_names(plan: Plan) -> tuple[str, ...]:

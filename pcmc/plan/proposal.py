@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import compress, product
-from typing import TYPE_CHECKING, Any
+from itertools import compress, filterfalse, product
+from typing import Any
 
 import numpy as np
 import shapely
@@ -22,10 +22,7 @@ from .drawing import Drawing
 from .edges import cable_for
 from .lines import Kind, PlanLine
 from .parts import CableLine, Divider, Hole, PatchSpec, check_count, check_keys
-from .strokes import Label
-
-if TYPE_CHECKING:
-    from .plan import Plan
+from .plan import Chosen, Plan
 
 TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small
@@ -64,8 +61,7 @@ def first_edge_length(parts: Sequence[Part], holes: Iterable[Curve]) -> float:
     area = sum(part.area.area for part in parts)
     least, most = (math.sqrt(area / (count * math.sqrt(0.1875))) for count in (FINEST, TRIANGLES))
     rims = (curve.length / 12.0 for curve in holes)
-    usual = min([most, *(part.radius / ACROSS for part in parts), *rims])
-    return two_digits(max(usual, least))
+    return two_digits(max(min([most, *(part.radius / ACROSS for part in parts), *rims]), least))
 
 
 def edge_length_for(plan: Plan) -> float:
@@ -109,11 +105,9 @@ def least_tensions(plan: Plan, whole: float) -> dict[str, float]:
 
 def plan_area(plan: Plan) -> Any:
     """The whole plan on Π without its holes, as a polygon; small level holes are filled."""
-    holes, mirrors = (
-        [curve.local(plan.plane) for curve in curves]
-        for curves in ([hole.curve for hole in plan.holes], plan.mirrors)
-    )
-    return _unfolded(_roof_area(plan.outline.local(plan.plane), holes, SMALL_HOLE), mirrors)
+    holes = [hole.curve.local(plan.plane) for hole in plan.holes]
+    area = _roof_area(plan.outline.local(plan.plane), holes, SMALL_HOLE)
+    return _unfolded(area, [mirror.local(plan.plane) for mirror in plan.mirrors])
 
 
 def _unfolded(area: Any, mirrors: Sequence[Curve]) -> Any:
@@ -174,37 +168,43 @@ def least_tension(area: Any, pressure: float = 1.0) -> float:
     return pressure * low
 
 
-def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The keys of a plan for a drawing: those ``given``, and values for all others.
+def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> tuple[dict[str, Any], Chosen]:
+    """The keys of a plan for a drawing: those ``given``, and values for all others; and what was chosen.
 
     An entry of ``dividers``, ``holes`` or ``cables`` with the ``name`` of a drawn one and no curve changes
     that one; others are added. PlanError or OptionError for a name that the drawing does not have.
     """
-    values = dict(given or {})
+    values, chosen = dict(given or {}), Chosen()
     sail = drawing.loose or bool(drawing.cables) or values.get("edge") in ("free", "cable")
     holes = list(drawing.holes.values())
     try:
         parts = parts_of(drawing.outline, holes, drawing.dividers.values(), drawing.gap)
     except PlanError as error:
         raise error.in_file(drawing.path) from None
-    specs = _patches(parts, drawing, values.pop("patches", {}), values.pop("tension", None))
+    specs = _patches(parts, drawing, values.pop("patches", {}))
+    if (tension := values.pop("tension", None)) is None:
+        roof = _unfolded(_roof_area(drawing.outline, holes, SMALL_HOLE), drawing.mirrors)
+        tension = two_digits(ABOVE_LEAST * least_tension(roof))
+        chosen.tensions.update({spec["name"]: tension for spec in specs if spec["tension"] is None})
     common = {"pressure": 0.0} if sail else {}  # an edge that nothing holds closes no space for a pressure
     common |= {key: values.pop(key) for key in ("pressure", "weight") if key in values}
     for spec, (key, value) in product(specs, common.items()):
         spec.setdefault(key, value)
-    tensions = [spec["tension"] for spec in specs]
-    edge_length = values.setdefault("edge_length", first_edge_length(parts, holes))
+    tensions = [tension if spec["tension"] is None else spec["tension"] for spec in specs]
+    if "edge_length" not in values:
+        chosen.edge_length = first_edge_length(parts, holes)
+    edge_length = values.pop("edge_length", chosen.edge_length)
     outline = PlanLine("the outline", Kind.OUTLINE, drawing.outline)
     tree = shapely.STRtree([part.area for part in parts])
     near = NEAR * sum(part.area.length for part in parts)
     points = [support for support in drawing.supports if not isinstance(support, Curve)]
     cable = cable_for(drawing.outline, max(tensions), points)
-    if drawing.loose and values.setdefault("edge", "cable") == "cable":
-        values.setdefault("cable", cable)
+    if drawing.loose and values.setdefault("edge", "cable") == "cable" and "cable" not in values:
+        values["cable"] = chosen.cables[""] = cable
     cables = _changed(drawing.cables, values.pop("cables", []), "cable", CableLine)
     for entry in cables:
-        if isinstance(entry, dict) and entry.get("name") in drawing.cables:
-            entry.setdefault("tension", cable)
+        if isinstance(entry, dict) and entry.get("name") in drawing.cables and "tension" not in entry:
+            entry["tension"] = chosen.cables[entry["name"]] = cable
     dividers = _changed(drawing.dividers, values.pop("dividers", []), "divider", Divider)
     for entry in dividers:
         if not isinstance(entry, dict) or entry.get("name") not in drawing.dividers:
@@ -215,30 +215,28 @@ def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[s
             entry.setdefault("wall", False)
         else:
             entry.setdefault("bottom", "held" if drawing.flat else "sloped")
-            most = most_in_corners(curve, outline, edge_length)
-            entry.setdefault("wall", _wall_tension(curve, tree, tensions, near, most, upright))
+            if "wall" not in entry:
+                most = most_in_corners(curve, outline, edge_length)
+                wall = _wall_tension(curve, tree, tensions, near, most, upright)
+                entry["wall"] = chosen.walls[name] = wall
         if name in drawing.ridges:
             entry.setdefault("cable", cable)
     patches: dict[str, dict[str, Any]] = {}
-    for spec in specs:
-        same = patches.setdefault(spec.pop("name"), spec)
+    for spec, own in zip(specs, tensions, strict=True):
+        name, spec["tension"] = spec.pop("name"), own
+        same = patches.setdefault(name, spec)
+        if same["tension"] != own:
+            text = f"{drawing.path}: the parts of {name!r} have the tensions {same['tension']:g} and"
+            raise PlanError(f"{text} {own:g}; give it one", what="patch", where=name)
         if same is not spec:  # several parts of one name are one patch
             same["at"] = [*_as_points(same["at"]), *_as_points(spec["at"])]
-    plan: dict[str, Any] = {
-        "outline": drawing.outline,
-        "edge_length": edge_length,
-        "holes": _changed(drawing.holes, values.pop("holes", []), "hole", Hole),
-        "dividers": dividers,
-        "supports": [*drawing.supports, *values.pop("supports", [])],
-        "patches": patches,
-    }
-    if cables:
-        plan["cables"] = cables
-    if drawing.mirrors:
-        plan["mirrors"] = [*drawing.mirrors, *values.pop("mirrors", [])]
-    if drawing.level != 0.0:
-        plan["plane"] = {"point": [0.0, 0.0, drawing.level]}
-    return plan | values
+    plan: dict[str, Any] = {"outline": drawing.outline, "edge_length": edge_length}
+    plan["holes"] = _changed(drawing.holes, values.pop("holes", []), "hole", Hole)
+    plan |= {"dividers": dividers, "supports": [*drawing.supports, *values.pop("supports", [])]}
+    plan |= {"patches": patches} | ({"cables": cables} if cables else {})
+    plan |= {"mirrors": [*drawing.mirrors, *values.pop("mirrors", [])]} if drawing.mirrors else {}
+    plan |= {"plane": {"point": [0.0, 0.0, drawing.level]}} if drawing.level != 0.0 else {}
+    return plan | values, chosen
 
 
 def _wall_tension(
@@ -252,30 +250,23 @@ def _wall_tension(
     return balanced_wall([[min(t)] if upright and t else t for t in neighbours], most)
 
 
-def _patches(
-    parts: Sequence[Part], drawing: Drawing, given: Mapping[str, Any], tension: float | None
-) -> list[dict[str, Any]]:
-    """For each part its patch's name, point and values: given, of the drawing, or proposed."""
+def _patches(parts: Sequence[Part], drawing: Drawing, given: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """For each part its patch's name, point and values, given or of the drawing; a tension may be None."""
     if not parts:
         text = f"{drawing.path}: the outline encloses no area in plan; draw it around the roof"
         raise PlanError(text, what="outline")
-    roof = _roof_area(drawing.outline, drawing.holes.values(), SMALL_HOLE)
-    least = least_tension(_unfolded(roof, drawing.mirrors))
-    default = two_digits(ABOVE_LEAST * least) if tension is None else tension
-    labels, specs = _labels(parts, drawing), []
+    (names, drawn), specs = _labels(parts, drawing), []
     for k, part in enumerate(parts):
         point = [_rounded(value, part.radius) for value in part.middle]
         point = point if shapely.contains_xy(part.area, *point) else list(part.middle)
-        label = labels.get(k) or Label("roof" if len(parts) == 1 else f"patch {k + 1}", (0.0, 0.0))
-        own = default if label.tension is None else label.tension
-        specs.append({"name": label.name, "tension": own, "at": point})
+        name = names.get(k, "roof" if len(parts) == 1 else f"patch {k + 1}")
+        specs.append({"name": name, "tension": drawn.get(name), "at": point})
     for name, attributes in given.items():
         check_keys(attributes, PatchSpec, f"patch {name!r}")
-        if attributes.get("at") is None:
-            chosen = [spec for spec in specs if spec["name"] == name]
-        else:
-            at = _parts_at(parts, attributes["at"])
-            chosen = [spec for part, spec in zip(parts, specs, strict=True) if part in at]
+        at = attributes.get("at")
+        owned = parts if at is None else _parts_at(parts, at)
+        pairs = [(part, spec) for part, spec in zip(parts, specs, strict=True) if part in owned]
+        chosen = [spec for _, spec in pairs if at is not None or spec["name"] == name]
         if not chosen:
             known = dict.fromkeys(str(spec["name"]) for spec in specs)
             problem = unknown("patch of the drawing", name, known)
@@ -299,42 +290,40 @@ def _as_points(at: Any) -> list[Any]:
 
 
 def _parts_at(parts: Sequence[Part], at: Any) -> list[Part]:
-    """The parts that have one of the points of a patch."""
     inside = [shapely.contains_xy(part.area, *np.transpose(_as_points(at))).any() for part in parts]
     return list(compress(parts, inside))
 
 
-def _labels(parts: Sequence[Part], drawing: Drawing) -> dict[int, Label]:
-    """The names that the drawing gives to parts, by the number of the part."""
-    owner: dict[int, Label] = {}
+def _labels(parts: Sequence[Part], drawing: Drawing) -> tuple[dict[int, str], dict[str, float]]:
+    """The names that the drawing gives to parts, by the number of the part, and tensions by name."""
+    owner, tensions = dict[int, str](), dict[str, float]()
     for label in drawing.labels:
         inside = [k for k, part in enumerate(parts) if shapely.contains_xy(part.area, *label.point)]
         if not inside:
             x, y = label.point
             problem = f"{drawing.path}: the name {label.name!r} at ({x:.6g}, {y:.6g}) is outside the plan"
             raise PlanError(f"{problem}; move it into the part that it names", what="patch", where=label.name)
-        other = owner.setdefault(inside[0], label).name
+        other = owner.setdefault(inside[0], label.name)
         if other != label.name:
             problem = f"{drawing.path}: {other!r} and {label.name!r} name one part of the plan; draw a"
             raise PlanError(f"{problem} divider between them, or delete one", what="patch", where=label.name)
-        owner[inside[0]] = label
-    return owner
+        if label.tension is not None and tensions.setdefault(other, label.tension) != label.tension:
+            problem = f"{drawing.path}: texts give {other!r} the tensions {tensions[other]:g} and"
+            raise PlanError(f"{problem} {label.tension:g}; delete one", what="patch", where=other)
+    return owner, tensions
 
 
 def _changed(drawn: Mapping[str, Curve], given: Sequence[Any], what: str, kind: Any) -> list[Any]:
     """The drawn curves by name with the values given for them, and further entries."""
-    entries: dict[str, dict[str, Any]] = {
-        name: {"curve": curve, "name": name} for name, curve in drawn.items()
-    }
-    more = []
-    for entry in given:
-        if not isinstance(entry, Mapping) or "name" not in entry or "curve" in entry:
-            more.append(entry)
-            continue
-        name = entry["name"]
-        if name not in entries:
+    entries: dict[str, Any] = {name: {"curve": curve, "name": name} for name, curve in drawn.items()}
+
+    def changes_drawn(entry: Any) -> bool:
+        return isinstance(entry, Mapping) and "name" in entry and "curve" not in entry
+
+    for entry in filter(changes_drawn, given):
+        if (name := entry["name"]) not in entries:
             problem = f"{unknown(f'{what} of the drawing', name, entries)}; add one with curve = ..."
             raise OptionError(problem, what=f"{what}s", found=name, expected=tuple(entries))
         check_keys(entry, kind, f"{what} {name!r}")
         entries[name] |= entry
-    return [*entries.values(), *more]
+    return [*entries.values(), *filterfalse(changes_drawn, given)]

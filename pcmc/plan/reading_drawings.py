@@ -38,8 +38,8 @@ class Contents:
         if len(self.entities) >= MOST_ENTITIES:
             raise RuntimeError(f"more than {MOST_ENTITIES} entities; export the roof's layers alone")
         if self.points > MOST_POINTS:
-            text = f"its curves have more than {MOST_POINTS} points; export the roof's layers alone"
-            raise RuntimeError(text)
+            problem = f"its curves have more than {MOST_POINTS} points"
+            raise RuntimeError(f"{problem}; export the roof's layers alone")
         self.entities.append({"layer": layer, "kind": kind, "handle": handle, **held})
 
     def leave_out(self, layer: str, kind: str) -> None:
@@ -90,15 +90,13 @@ def _with_blocks(entities: Any, layer: str | None, depth: int) -> Iterator[tuple
         if entity.dxftype() == "INSERT" and depth < DEPTH:
             if entity.mcount > 1000:
                 raise RuntimeError(f"block reference {entity.dxf.handle} repeats {entity.mcount} times")
-            copies = entity.multi_insert() if entity.mcount > 1 else (entity,)
-            for copy in copies:
+            for copy in entity.multi_insert() if entity.mcount > 1 else (entity,):
                 yield from _with_blocks(copy.virtual_entities(), own, depth + 1)
         else:
             yield own, entity
 
 
 def _dxf_pieces(kind: str, entity: Any) -> list[tuple[Any, ...]] | None:
-    """The pieces of a curve; None for another entity."""
     from ezdxf.entities import Ellipse
 
     if kind == "LINE":
@@ -138,8 +136,7 @@ def rhino_entities(path: str) -> dict[str, Any]:
     def visit(item: Any, places: list[Any], depth: int) -> None:
         """Add an object, moved by the transforms of the blocks around it, innermost first."""
         name, visible = layers.get(item.Attributes.LayerIndex, ("", True))
-        geometry = item.Geometry
-        handle = str(item.Attributes.Id)[:8]
+        geometry, handle = item.Geometry, str(item.Attributes.Id)[:8]
         if not (visible and item.Attributes.Visible):
             contents.hide(name)
         elif isinstance(geometry, rhino.InstanceReference) and depth < DEPTH:
@@ -167,10 +164,8 @@ def _xyz(point: Any) -> tuple[float, float, float]:
 
 def _add_rhino(rhino: Any, contents: Contents, layer: str, handle: str, geometry: Any) -> None:
     kind = type(geometry).__name__
-    if isinstance(geometry, rhino.Point):
-        contents.add(layer, kind, handle, point=_xyz(geometry.Location))
-    elif isinstance(geometry, rhino.PointCloud):
-        for point in geometry.GetPoints():
+    if isinstance(geometry, (rhino.Point, rhino.PointCloud)):
+        for point in geometry.GetPoints() if kind == "PointCloud" else [geometry.Location]:
             contents.add(layer, kind, handle, point=_xyz(point))
     elif isinstance(geometry, rhino.TextDot):
         contents.add(layer, kind, handle, point=_xyz(geometry.Point), text=geometry.Text)
@@ -204,8 +199,8 @@ def _rhino_pieces(rhino: Any, curve: Any) -> Iterator[tuple[Any, ...]]:
         if arc is not None:  # what Rhino's own lists of objects hold for arcs and circles
             yield _rhino_arc(form, arc)
             return
-        knots = [form.Knots[k] for k in range(len(form.Knots))]
-        knots = [knots[0], *knots, knots[-1]]  # Rhino leaves out the first and the last
+        inner = [form.Knots[k] for k in range(len(form.Knots))]
+        knots = [inner[0], *inner, inner[-1]]  # Rhino leaves out the first and the last
         yield ("nurbs", form.Degree, knots, points, weights if form.IsRational else None)
 
 

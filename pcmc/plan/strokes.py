@@ -25,8 +25,7 @@ from ..base.validate import checked_name
 from ..surface.curves import Curve
 from ..surface.pieces import Piece, point_text
 
-LIBRARIES = {".dxf": "ezdxf", ".3dm": "rhino3dm"}
-"""The suffixes of drawings, and the libraries that read them."""
+LIBRARIES = {".dxf": "ezdxf", ".3dm": "rhino3dm"}  # that read drawings, by suffix
 READERS = {".dxf": "dxf_entities", ".3dm": "rhino_entities"}
 LARGEST = 1e12  # of a coordinate; beyond, the digits of a double are too few for a roof
 HIGHEST_DEGREE = 11  # of a NURBS curve, in Rhino
@@ -87,17 +86,15 @@ def _strokes(entity: Mapping[str, Any], factor: float) -> list[Stroke]:
         text = None if text is None else re.sub(r"\s+", " ", text).strip()[:200]
         point = factor * _coordinates([entity["point"]], layer, place)[0]
         return [Stroke(layer, label, point=point, text=text)]
-    runs: list[list[Piece]] = []
-    before = np.zeros(3)
+    runs, before = list[list[Piece]](), np.zeros(3)
     for piece in (piece for raw in entity["pieces"] for piece in _pieces(raw, layer, place)):
         ends = piece.at(np.array([0.0, 1.0])) if piece.sweep else piece.points[[0, -1]]
         size = float(np.linalg.norm(piece.points, axis=1).max())
         if not piece.sweep and np.ptp(piece.points, axis=0).max() <= 1e-14 * size:
             continue  # a point drawn twice in a polyline
-        if runs and np.linalg.norm(before - ends[0]) <= ON * (size + 1.0):
-            runs[-1].append(replace(piece, points=factor * piece.points))
-        else:
-            runs.append([replace(piece, points=factor * piece.points)])
+        if not runs or np.linalg.norm(before - ends[0]) > ON * (size + 1.0):
+            runs.append([])
+        runs[-1].append(replace(piece, points=factor * piece.points))
         before = ends[1]
     return [Stroke(layer, label, Curve(tuple(run))) for run in runs]
 
@@ -105,22 +102,18 @@ def _strokes(entity: Mapping[str, Any], factor: float) -> list[Stroke]:
 def _coordinates(points: Any, layer: str, place: str) -> Floats:
     """(k,3) the points, all of them numbers of a size that a roof may have."""
     P = np.array(points, dtype=np.float64).reshape(-1, 3)
-    bad = np.flatnonzero(~(np.abs(P) <= LARGEST).all(axis=1))
-    if len(bad):
-        found = P[bad[0]].tolist()
+    for found in P[~(np.abs(P) <= LARGEST).all(axis=1)].tolist():
         text = f"{place}: its point {found} is not a number up to {LARGEST:g}; draw it again"
         raise FileError(text, where=layer, found=found)
     return P
 
 
 def _pieces(raw: tuple[Any, ...], layer: str, place: str) -> list[Piece]:
-    """The pieces of a raw piece of ``reading_drawings``."""
     kind, *values = raw
     if kind != "nurbs":
         return [Piece(_coordinates(values[0], layer, place), float(values[1]) if kind == "arc" else 0.0)]
     degree, knots, points, weights = values
-    P = _coordinates(points, layer, place)
-    t = np.array(knots, dtype=np.float64)
+    P, t = _coordinates(points, layer, place), np.array(knots, dtype=np.float64)
     w = np.ones(len(P)) if weights is None else np.array(weights, dtype=np.float64)
     sound = 1 <= degree <= HIGHEST_DEGREE and len(t) == len(P) + degree + 1 and len(w) == len(P) > degree
     if not sound or not np.isfinite(t).all() or (np.diff(t) < 0.0).any() or not (w > 0.0).all():
@@ -160,7 +153,7 @@ def bezier_spans(degree: int, knots: Floats, points: Floats, weights: Floats) ->
     return list(zip(homogeneous[:, :, :-1] / weight[:, :, None], weight, strict=True))
 
 
-MEANINGS = {
+MEANINGS = {  # of the layers that a drawing of a plan may have
     "outline": "the closed edge of the roof",
     "divider NAME": "a line between patches; a wall stands below it",
     "hole NAME": "a closed edge of an opening, held at its height",
@@ -173,7 +166,6 @@ MEANINGS = {
     "height": "points through which the roof should pass, or texts such as 4.5",
     "patch NAME": "a point or a text inside a part of the plan: its name, or its name = its tension",
 }
-"""The layers that a drawing of a plan may have."""
 
 ROLES = tuple(key.split()[0] for key in MEANINGS)
 UNDERSTOOD = ", ".join(MEANINGS)
@@ -245,14 +237,14 @@ def labels_of(layers: Sequence[tuple[Layer, Sequence[Stroke]]]) -> list[Label]:
     for layer, stroke in ((layer, stroke) for layer, strokes in layers for stroke in strokes):
         if stroke.point is None:
             continue
-        text = stroke.text or layer.name
+        text, problem = stroke.text or layer.name, ""
         name, equals, value = (part.strip() for part in text.partition("="))
         name = name or layer.name
         if not name:
             problem = "this patch has no name; write it as a text, or name the layer 'patch NAME'"
-            raise _error(stroke, problem, text)
-        if equals and not re.fullmatch(NUMBER, value):
+        elif equals and not re.fullmatch(NUMBER, value):
             problem = f"{value!r} in {text!r} is no tension; write a number, such as {name} = 4.5"
+        if problem:
             raise _error(stroke, problem, text)
         checked_name(f"layer {stroke.layer!r}, {stroke.label}", name, error=PlanError)
         x, y, _ = stroke.point.tolist()
@@ -266,6 +258,5 @@ def _value(text: str) -> float:
 
 
 def _error(stroke: Stroke, problem: str, found: str) -> PlanError:
-    where = f"layer {stroke.layer!r}"
-    at = "" if stroke.point is None else f" at {point_text(stroke.point)}"
+    where, at = f"layer {stroke.layer!r}", "" if stroke.point is None else f" at {point_text(stroke.point)}"
     return PlanError(f"{where}, {stroke.label}{at}: {problem}", what=where, found=found)

@@ -70,7 +70,8 @@ def lines(
     figure, axes = new_axes(width, height, title, x, y, xscale, yscale)
     fits = fits or {}
     for k, (label, curve) in enumerate(curves.items()):
-        turn, color = k // len(CURVES), CURVES[k % len(CURVES)]  # how many times all colours are used already
+        color = CURVES[k % len(CURVES)]
+        turn = k // len(CURVES)  # how many times all colours are used already
         plain = {"linewidth": 1.1, "linestyle": "" if label in fits else ("-", "--")[turn % 2]}
         look = overlap_style(k, len(curves)) if dashes else plain
         look |= {"color": color, "marker": MARKERS[(k + turn) % len(MARKERS)] if markers else None}
@@ -211,7 +212,7 @@ def heatmap(
     figure = new(width, width * ratio * -(-len(data) // columns) / columns + 200.0, pad=6.0)
     from matplotlib.colors import LogNorm, Normalize  # as ``new`` has found it installed
 
-    panels, _ = grid(figure, len(data), columns)
+    panels = grid(figure, len(data), columns)
     known = np.concatenate([table[np.isfinite(table)] for table in data.values()])
     low, high = limits or ((known.min(), known.max()) if len(known) else (1.0, 10.0))
     if not low < high:

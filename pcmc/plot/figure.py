@@ -16,7 +16,7 @@ from ..base.arrays import Floats
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.libraries import require
 from ..surface.colours import patch_colors, rgb
-from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, Image, Rendering
+from .scene import FIXED_DOT, NO_VALUE, SLIDING_DOT, Frame, Image, Rendering
 
 DPI = 200.0
 TEXT, SMALL = 7.0, 6.0  # points
@@ -44,13 +44,12 @@ def new(width: float, height: float, pad: float = 4.0) -> Any:
     return figure
 
 
-def grid(figure: Any, count: int, columns: int, **options: Any) -> tuple[list[Any], int]:
-    """``count`` axes in rows of ``columns``, and the number of rows."""
-    rows = -(-count // columns)
-    axes = figure.subplots(rows, columns, squeeze=False, **options).ravel().tolist()
+def grid(figure: Any, count: int, columns: int, **options: Any) -> list[Any]:
+    """``count`` axes in rows of ``columns``."""
+    axes = figure.subplots(-(-count // columns), columns, squeeze=False, **options).ravel().tolist()
     for unused in axes[count:]:
         unused.remove()
-    return axes[:count], rows
+    return list(axes[:count])
 
 
 def fit_height(figure: Any, ratios: Mapping[Any, float]) -> None:
@@ -77,24 +76,6 @@ def _as_written(figure: Any) -> None:
     for text in figure.findobj(Text):
         if "$" in text.get_text() and "mathdefault" not in text.get_text():
             text.set_parse_math(False)
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """A rectangle of pixels and the picture coordinates in it."""
-
-    size: tuple[int, int]  # width and height in pixels
-    low: Floats  # (2,) picture coordinates of the lower left corner
-    scale: float  # pixels per unit of length
-
-    def show(self, axes: Any, image: Image) -> None:
-        """Place a painted scene on the axes, pixel on pixel."""
-        right, top = self.low + np.array(self.size) / self.scale
-        figure, box = axes.figure.bbox, axes.get_window_extent()
-        left = round(box.x0) / figure.width
-        bottom = (figure.height - round(figure.height - box.y1) - self.size[1]) / figure.height
-        axes.set_position((left, bottom, self.size[0] / figure.width, self.size[1] / figure.height))
-        axes.imshow(image, extent=(self.low[0], right, self.low[1], top), aspect="auto")
 
 
 def frames_of(points: Sequence[Floats], columns: int, width: int, one_scale: bool = True) -> list[Frame]:

@@ -178,7 +178,7 @@ def compose(
     figure = new(width, sum(heights) + 100.0, pad=0.0)
     if mark or any(drawing.title for drawing in drawings):
         figure.get_layout_engine().set(h_pad=ABOVE / DPI)
-    axes, _ = grid(figure, len(frames), columns, height_ratios=heights)
+    axes = grid(figure, len(frames), columns, height_ratios=heights)
     for place, drawing in zip(axes, drawings, strict=True):
         place.set_axis_off()
         place.set_title(drawing.title, fontsize=TEXT, color=INK, pad=5.0)
@@ -188,8 +188,7 @@ def compose(
     for k, drawing in enumerate(drawings):
         fill = None if colors is None or drawing.values is None else colors.rgb(drawing.values)
         look = {"supports": dotted[k], "edges": edge[k] >= EDGES_FROM if edges is None else edges}
-        painted = scene(drawing.surface, drawing.view, fill, patches=drawing.patches, **look)
-        images.append(paint(painted, frames[k].low, frames[k].scale, frames[k].size, renderer))
+        images.append(paint(scene(drawing, fill, **look), frames[k], renderer))
     if legend:
         add_picture_legend(figure, list(zip(drawings, dotted, images, strict=True)))
     if mark:

@@ -81,11 +81,17 @@ class Rendering:
     patches: Sequence[str] | None  # the names of those to draw; None: all
 
     @property
+    def faces(self) -> Bools:
+        """(m,) triangles of the patches drawn."""
+        if self.patches is None:
+            return np.ones(self.surface.m, dtype=bool)
+        return self.surface.patch_faces([self.surface.patch_index(name) for name in self.patches])
+
+    @property
     def shown(self) -> Bools:
         """(n,) vertices of the patches drawn."""
         shown = np.full(self.surface.n, self.patches is None)
-        faces = self.surface.patch_faces([self.surface.patch_index(name) for name in self.patches or ()])
-        shown[self.surface.faces[faces]] = True
+        shown[self.surface.faces[self.faces]] = True
         return shown
 
     def points(self, every: bool) -> Floats:
@@ -112,23 +118,12 @@ class Scene:
     order: Ints
 
 
-def scene(
-    surface: Surface,
-    view: Camera,
-    values: Floats | None,
-    *,
-    supports: bool,
-    edges: bool,
-    patches: Sequence[str] | None = None,
-) -> Scene:
-    """The scene of a surface, or of the ``patches`` named; ``edges`` draws the mesh.
+def scene(drawing: Rendering, values: Floats | None, *, supports: bool, edges: bool) -> Scene:
+    """The scene of a drawing; ``edges`` draws the mesh.
 
     ``values`` are None for patch colours, or RGB (n,3) or (m,3), NaN where there is none.
     """
-    surface = surface.cell
-    shown = np.ones(surface.m, dtype=bool)
-    if patches is not None:
-        shown = surface.patch_faces([surface.patch_index(name) for name in patches])
+    surface, view, shown = drawing.surface.cell, drawing.view, drawing.faces
     F, topo = surface.faces[shown], surface.topology
     P = surface.vertices[F]
     near = view.depth(P).mean(axis=1)
@@ -156,17 +151,12 @@ def scene(
     held = np.flatnonzero(seen & surface.held)
     edge_depth = _nearest(len(topo.edges), topo.edge_of_face[shown], near)[chosen]
     depth = [np.tile(near, len(P) // max(len(F), 1)), edge_depth, _nearest(surface.n, F, near)[held]]
-    return Scene(
-        view,
-        P,
-        np.clip(colors, 0.0, 1.0),
-        ends,
-        np.where(heavy, 1.6, 0.6),
-        np.where(heavy[:, None], rgb(LINE), rgb(MESH_LINE)),
-        surface.vertices[held] + 3 * LIFT * surface.size * view.axes[2],
-        np.where(surface.pinned[held][:, None], rgb(FIXED_DOT), rgb(SLIDING_DOT)),
-        np.argsort(np.concatenate(depth), kind="stable"),
-    )
+    order = np.argsort(np.concatenate(depth), kind="stable")
+    shades = np.where(heavy[:, None], rgb(LINE), rgb(MESH_LINE))
+    dots = surface.vertices[held] + 3 * LIFT * surface.size * view.axes[2]
+    dot_colors = np.where(surface.pinned[held][:, None], rgb(FIXED_DOT), rgb(SLIDING_DOT))
+    lines = ends, np.where(heavy, 1.6, 0.6), shades
+    return Scene(view, P, np.clip(colors, 0.0, 1.0), *lines, dots, dot_colors, order)
 
 
 def _nearest(count: int, parts: Ints, near: Floats) -> Floats:
@@ -216,22 +206,38 @@ def mean_edge(surface: Surface) -> float:
     return float(np.linalg.norm(P - np.roll(P, 1, axis=1), axis=2).mean())
 
 
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A rectangle of pixels and the picture coordinates in it."""
+
+    size: tuple[int, int]  # width and height in pixels
+    low: Floats  # (2,) picture coordinates of the lower left corner
+    scale: float  # pixels per unit of length
+
+    def show(self, axes: Any, image: Image) -> None:
+        """Place a painted scene on the axes, pixel on pixel."""
+        right, top = self.low + np.array(self.size) / self.scale
+        figure, box = axes.figure.bbox, axes.get_window_extent()
+        left = round(box.x0) / figure.width
+        bottom = (figure.height - round(figure.height - box.y1) - self.size[1]) / figure.height
+        axes.set_position((left, bottom, self.size[0] / figure.width, self.size[1] / figure.height))
+        axes.imshow(image, extent=(self.low[0], right, self.low[1], top), aspect="auto")
+
+
 RENDERERS = ("auto", "pyvista", "matplotlib")
 SAMPLES = 2  # pixels painted for each pixel shown, in each direction
 DOT = 5.0  # pixels across
 MANY = 40_000  # triangles from which pyvista is faster than matplotlib, its import and first answer included
 
 
-def paint(scene: Scene, low: Floats, scale: float, size: tuple[int, int], renderer: str = "auto") -> Image:
-    """(h,w,3) bytes: the scene with picture coordinates ``low`` at the lower left corner, ``scale``
-    pixels per unit of length, ``size`` (w, h) in pixels.
-    """
+def paint(scene: Scene, frame: Frame, renderer: str = "auto") -> Image:
+    """(h,w,3) bytes: the scene in a frame."""
     from PIL import Image as Pillow
 
     validate.choice("renderer", renderer, RENDERERS)
     fast = renderer == "pyvista" or (renderer == "auto" and len(scene.corners) > MANY and opengl())
     painter = _with_pyvista if fast else _with_matplotlib
-    fine = Pillow.fromarray(np.ascontiguousarray(painter(scene, low, scale, size)))
+    fine = Pillow.fromarray(np.ascontiguousarray(painter(scene, frame)))
     return np.asarray(fine.reduce(SAMPLES))
 
 
@@ -248,9 +254,9 @@ def opengl() -> bool:
     return not subprocess.run([sys.executable, "-c", probe], capture_output=True, check=False).returncode
 
 
-def _with_pyvista(scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> Floats:
+def _with_pyvista(scene: Scene, frame: Frame) -> Floats:
     pyvista = load_library("pyvista", "plot")
-    width, height = size[0] * SAMPLES, size[1] * SAMPLES
+    width, height = frame.size[0] * SAMPLES, frame.size[1] * SAMPLES
     with pyvista.vtk_verbosity("off"):
         plotter = pyvista.Plotter(off_screen=True, window_size=(width, height), lighting="none")
         plotter.set_background("white")
@@ -270,35 +276,35 @@ def _with_pyvista(scene: Scene, low: Floats, scale: float, size: tuple[int, int]
             round_dots = {"style": "points", "render_points_as_spheres": True, "point_size": SAMPLES * DOT}
             plotter.add_mesh(dots, **plain, **round_dots)
         (right, up, towards), depth = scene.view.axes, scene.view.depth(scene.corners.reshape(-1, 3))
-        thick, reach = np.ptp(depth), max(np.ptp(depth), max(size) / scale)
-        (across, high), camera = low + np.array(size) / (2.0 * scale), plotter.camera
+        thick, reach = np.ptp(depth), max(np.ptp(depth), max(frame.size) / frame.scale)
+        (across, high), camera = frame.low + np.array(frame.size) / (2.0 * frame.scale), plotter.camera
         focus = across * right + high * up + depth.max() * towards
         camera.position, camera.focal_point, camera.up = focus + reach * towards, focus, up
-        camera.parallel_projection, camera.parallel_scale = True, size[1] / (2.0 * scale)
+        camera.parallel_projection, camera.parallel_scale = True, frame.size[1] / (2.0 * frame.scale)
         camera.clipping_range = (0.5 * reach, 1.5 * reach + thick)
         image = plotter.screenshot(return_img=True)
         plotter.close()
     return image[..., :3]
 
 
-def _with_matplotlib(scene: Scene, low: Floats, scale: float, size: tuple[int, int]) -> Floats:
+def _with_matplotlib(scene: Scene, frame: Frame) -> Floats:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
 
     project = scene.view.project
     circle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-    disc = np.stack([np.cos(circle), np.sin(circle)], axis=1) * DOT / (2.0 * scale)
+    disc = np.stack([np.cos(circle), np.sin(circle)], axis=1) * DOT / (2.0 * frame.scale)
     shapes = [*project(scene.corners), *project(scene.segments), *(project(scene.dots)[:, None] + disc)]
     fills = np.concatenate([scene.colors.mean(axis=1), scene.shades, scene.dot_colors])
     widths = np.concatenate([np.full(len(scene.corners), 0.4), scene.widths, np.zeros(len(scene.dots))])
-    order, (right, top) = scene.order, low + np.array(size) / scale
-    figure = Figure(figsize=(size[0] / 72.0, size[1] / 72.0), dpi=72.0 * SAMPLES)
+    order, (right, top) = scene.order, frame.low + np.array(frame.size) / frame.scale
+    figure = Figure(figsize=(frame.size[0] / 72.0, frame.size[1] / 72.0), dpi=72.0 * SAMPLES)
     canvas, axes = FigureCanvasAgg(figure), figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
-    axes.set(xlim=(low[0], right), ylim=(low[1], top))
+    axes.set(xlim=(frame.low[0], right), ylim=(frame.low[1], top))
     painted, fills = [shapes[k] for k in order], fills[order]
     look: dict[str, Any] = {"linewidths": widths[order], "joinstyle": "round"}
     axes.add_collection(PolyCollection(painted, facecolors=fills, edgecolors=fills, **look))
     canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[: size[1] * SAMPLES, : size[0] * SAMPLES, :3]
+    return np.asarray(canvas.buffer_rgba())[: frame.size[1] * SAMPLES, : frame.size[0] * SAMPLES, :3]

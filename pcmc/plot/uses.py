@@ -33,8 +33,8 @@ def strains(pattern: CuttingPattern, path: Path | None = None, **options: Any) -
     200
     """
     strips = pattern.strips
-    first = np.cumsum([0, *(len(strip.roof) for strip in strips)])
-    faces = np.concatenate([strip.faces + start for strip, start in zip(strips, first[:-1], strict=True)])
+    starts = np.cumsum([0, *(len(strip.roof) for strip in strips[:-1])])
+    faces = np.concatenate([strip.faces + start for strip, start in zip(strips, starts, strict=True)])
     owner = np.repeat(np.arange(len(strips)), [len(strip.faces) for strip in strips])
     patches = tuple(Patch(f"strip {strip.number}", 1.0) for strip in strips)
     roof = np.concatenate([strip.roof for strip in strips])
@@ -128,8 +128,9 @@ def member_forces(
     force, length = units.force or "force", units.length or "length"
     rows = {"N": force, "V": force, "M": f"{force}·{length}"}
     columns = min(len(names), BESIDE)
-    figure = new(width, HIGH * len(rows) * -(-len(names) // columns), pad=8.0)
-    axes, _ = grid(figure, len(rows) * columns * -(-len(names) // columns), columns)
+    count = len(rows) * -(-len(names) // columns)
+    figure = new(width, HIGH * count, pad=8.0)
+    axes = grid(figure, count * columns, columns)
     for k, name in enumerate(names):
         own = table[table["member"] == name]
         for row, (column, unit) in enumerate(rows.items()):
@@ -207,9 +208,9 @@ def equilibria(
         branches = {f"branch {k}": branch for k, branch in enumerate(found.branches[line.name], 1)}
         count = add_branches(axes, branches, "parameter", y)
         axes.axvline(line.value, color=INK, linewidth=0.6, linestyle=":")
+        at = {"xytext": (4, 4), "textcoords": "offset points", "fontsize": TEXT, "color": INK}
         for k, height in enumerate(found.table[y][:MOST_PICTURES], 1):
             axes.plot(line.value, height, "o", color=INK, markersize=3.0, zorder=3)
-            at = {"xytext": (4, 4), "textcoords": "offset points", "fontsize": TEXT, "color": INK}
             axes.annotate(str(k), (line.value, height), **at)
         margin = 0.03 * (line.span[1] - line.span[0])
         axes.set_xlim(line.span[0] - margin, line.span[1] + margin)
@@ -221,6 +222,6 @@ def equilibria(
         axes.imshow(draw(one.surface, view=view, width=PICTURE, supports=False, edges=False))
         axes.axis("off")
         kind = "stable" if one.index == 0 else f"saddle, index {one.index}"
-        energy = f"E = {one.energy:.5g}{units.behind('energy')}"
-        axes.set_title(f"{k}: {kind}\n{energy}", fontsize=SMALL, color=INK)
+        text = f"{k}: {kind}\nE = {one.energy:.5g}{units.behind('energy')}"
+        axes.set_title(text, fontsize=SMALL, color=INK)
     return finish(figure, path)

@@ -7,21 +7,19 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..advice.advice import changes, coarse, firmer_walls, flatter, improved, loosened, lower_lines
 from ..advice.rises import SHARES, as_sail, point_masts, ring_lines, take_rises, with_rings, with_rises
 from ..base.errors import PcmcError
 from ..certificate.balance import strained_junction
+from ..design import Target
 from ..plan import Plan
 from ..surface import Surface
 from .file import Project
 from .outcome import OnStep, Outcome, ignore
 from .settings import AccuracyWanted
 from .solving import solve_project
-
-if TYPE_CHECKING:
-    from ..design import Target
 
 Changed = Callable[[Surface], Surface]
 TRIES = 3  # plans tried
@@ -53,28 +51,27 @@ def advice(project: Project, given: Surface, start: Surface, outcome: Outcome) -
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the project's own warnings were shown
         mended = Mended(plan, True) if certified else _mended(project, plan, outcome)
-        better, targets = mended.plan, project.targets
+        better, targets, met, reached = mended.plan, project.targets, False, ""
         if mended.sail and project.rises:
             targets = targets[: -len(project.rises)]
-        met, reached = False, ""
         if mended.rests and targets:
             better, met, reached = _with_targets(project, better, outcome.surface, targets)
         lines = changes(plan, better, project.rises if mended.sail else ())
     if not (lines or mended.rings):
         return []
     tried = "which was tried and comes to rest" if mended.rests else "as a first step"
-    if mended.rings:
-        tried += ", on finer meshes, too"
+    tried += ", on finer meshes, too" if mended.rings else ""
     if met:
         tried = "which was tried, comes to rest and meets the targets"
     elif mended.rests and targets:
         tried = "which was tried without the targets and comes to rest"
     where = project.where_to_type
     if project.drawing is not None and mended.rings:
-        where = " and ".join([f"draw in {project.drawing.path.name}", *([where] if lines else [])])
+        where = f"draw in {project.drawing.path.name}" + (f" and {where}" if lines else "")
     ending = [f"with them, the targets are {reached}"] if reached else []
-    causes = ["edges that nothing holds"] if mended.sail else []
-    causes += ["a roof held at a single point"] if mended.rings else []
+    causes = ["edges that nothing holds"] * mended.sail + ["a roof held at a single point"] * bool(
+        mended.rings
+    )
     cause = f"the cause is {' and '.join(causes)}; " if causes else ""
     return [f"{cause}{where}, {tried}:", *lines, *mended.rings, *ending]
 
@@ -167,11 +164,7 @@ def _found(outcome: Outcome, changed: Changed | None, step: OnStep) -> str:
 
 
 def _tried(
-    project: Project,
-    plan: Plan,
-    surface: Surface,
-    changed: Changed | None = None,
-    step: OnStep = ignore,
+    project: Project, plan: Plan, surface: Surface, changed: Changed | None = None, step: OnStep = ignore
 ) -> Outcome | None:
     """How a plan ends on a mesh that is not fine; None if it has none, as with a patch inside a ring."""
     try:
@@ -184,6 +177,5 @@ def _tried(
 
 
 def _holds(roof: Outcome, step: OnStep = ignore) -> bool:
-    """Whether finer meshes hold a roof."""
     check = roof.check_mesh(step)
     return check is not None and check.persists

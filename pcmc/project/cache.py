@@ -26,13 +26,13 @@ from .. import io
 from ..base.errors import FileError, LostWarning, PcmcError
 from ..base.files import atomic_write, read_bytes
 from ..base.units import Units
+from ..design import Design, DesignStatus
 from ..io.mesh_data import to_surface
 from ..solvers.result import Result, Status
 from ..surface.surface import FIELDS
 from .file import Project
 from .outcome import Outcome
 
-VARIABLE = "PCMC_CACHE"
 MOST = 100  # roofs kept; the one used longest ago goes first
 OWN = "[0-9a-f]" * 64 + ".pcmc"  # its files: the folder that ``PCMC_CACHE`` names may have others
 PARTS = ["plan", "mesh", "method", "options", "wanted", "search"]
@@ -42,7 +42,7 @@ NUMBERS = ("method", "energy", "iterations", "evaluations", "note")  # of a resu
 
 def cache_folder() -> Path | None:
     """The folder of the cache, which may not exist yet; None if it is switched off."""
-    given = os.environ.get(VARIABLE, "")
+    given = os.environ.get("PCMC_CACHE", "")
     if given.lower() == "off":
         return None
     if given:
@@ -77,18 +77,15 @@ def cached(project: Project) -> Outcome | None:
         return None
     with suppress(PcmcError, OSError, KeyError, ValueError, TypeError):
         data = io.load(path)
-        values, surface = data.certificate, to_surface(data)
+        values, design = data.certificate, None
         solve = {name: values[name] for name in NUMBERS}
-        result, design = Result(surface, Status[values["status"]], rows=(), **solve), None
+        result = Result(to_surface(data), Status[values["status"]], rows=(), **solve)
         if given := values.get("design"):
-            from ..design import Design, DesignStatus
-
             targets, parameters = (pd.DataFrame(**given[name]) for name in ("targets", "parameters"))
             status, history = DesignStatus[given["status"]], pd.DataFrame()
             design = Design(status, result, targets, parameters, given["solves"], history=history)
         units = Units(*values["units"]) if project.plan is None else project.units
-        notes = values.get("notes", ())
-        outcome = Outcome(result, design=design, units=units, cached=True, notes=notes)
+        outcome = Outcome(result, design=design, units=units, cached=True, notes=values.get("notes", ()))
         os.utime(path)
         return outcome
     return None
@@ -99,10 +96,13 @@ def keep(project: Project, outcome: Outcome) -> None:
     path = _path(project)
     if path is None or not outcome.good:
         return
-    result, design, surface = outcome.solved, outcome.design, outcome.surface
+    result, design, surface, units = outcome.solved, outcome.design, outcome.surface, outcome.units
     values: dict[str, Any] = {name: getattr(result, name) for name in NUMBERS}
-    values |= {"status": result.status.name, "notes": list(outcome.notes)}
-    values["units"] = [outcome.units.length, outcome.units.force]
+    values |= {
+        "status": result.status.name,
+        "notes": list(outcome.notes),
+        "units": [units.length, units.force],
+    }
     if design is not None:
         tables = {name: getattr(design, name).to_dict("split") for name in ("targets", "parameters")}
         values["design"] = {"status": design.status.name, "solves": design.solves, **tables}
@@ -136,7 +136,6 @@ def _path(project: Project) -> Path | None:
 
 @cache
 def _program() -> str:
-    """The version of pcmc, and the time of its newest file for those who change it."""
     newest = max(path.stat().st_mtime_ns for path in Path(__file__).parents[1].rglob("*.py"))
     return f"pcmc {version('pcmc-surfaces')} {newest}\n"
 

@@ -54,7 +54,6 @@ def check_project_keys(text: str, data: Mapping[str, Any]) -> None:
 
 
 def _check_range(text: str, value: Any, place: Place) -> None:
-    """Refuse integers beyond the range of floats, wherever they are."""
     if isinstance(value, Mapping):
         for name, item in value.items():
             _check_range(text, item, (*place, name))
@@ -137,12 +136,13 @@ def line_with(path: Path, found: object) -> int:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError):
         return 0
-    if isinstance(found, str):
-        has = re.compile(rf"""["']{re.escape(found)}["']""").search
-        numbers = [number for number, line in enumerate(lines, 1) if has(line)]
-    else:
-        values = ((number, VALUE.findall(line.split("#")[0])) for number, line in enumerate(lines, 1))
-        numbers = [number for number, texts in values if any(float(text) == found for text in texts)]
+
+    def has(line: str) -> bool:
+        if isinstance(found, str):
+            return f'"{found}"' in line or f"'{found}'" in line
+        return any(float(text) == found for text in VALUE.findall(line.split("#")[0]))
+
+    numbers = [number for number, line in enumerate(lines, 1) if has(line)]
     return numbers[0] if len(numbers) == 1 else 0
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from ..accuracy.varied import Varied
 from ..advice.advice import check_apexes, chosen_values
 from ..base.errors import BalanceWarning, OptionError
 from ..base.files import PathLike
@@ -28,9 +28,6 @@ from .solving import solve_and_swap, solve_project
 from .start import start_of
 from .writing import check_outputs, project_files, write_all
 
-if TYPE_CHECKING:
-    pass
-
 
 def opened(
     path: Project | PathLike,
@@ -43,8 +40,8 @@ def opened(
 ) -> Outcome:
     """What is in a file: the designed roof of a project or a drawing, or the surface in any other file.
 
-    ``units`` is the unit of length that the roof is to be in; with ``start`` a project has its start shape,
-    not solved. The others are as of ``designed``. Errors as in ``load`` and ``pcmc.read``.
+    ``units`` is the unit of length wanted; with ``start`` a project has its start shape, not solved. The
+    others are as of ``designed``. Errors as in ``load`` and ``pcmc.read``.
 
     >>> roof = opened("notebooks/roof.toml", start=True)
     >>> roof.result is None, roof.certificate.certified
@@ -66,33 +63,20 @@ def designed(
     """The roof that a project describes: solved, its targets met, remeshed, as accurate as asked for.
 
     Nothing is written but the cache: a good roof is kept there, and comes from there the next time. A roof
-    that is not certified, or misses a target, is solved again each time.
-
-    Parameters
-    ----------
-    project : a Project, or the path of its file.
-    progress : called with a few words at each step.
-    changed : applied to the initial surface; such a roof is neither kept nor taken from the cache.
-    use_cache : False solves in any case, and keeps nothing.
-
-    Returns
-    -------
-    Outcome : ``surface`` is the roof, ``good`` whether it is what the project asks for. With ``whole = true``
-        ``shown`` is the whole roof.
+    that is not certified, or misses a target, is solved again each time. ``progress`` is called with a few
+    words at each step; ``changed`` is applied to the initial surface, and such a roof is neither kept nor
+    taken from the cache; with ``use_cache`` False no other is. ``surface`` of the outcome is the roof,
+    ``good`` whether it is what the project asks for; with ``whole = true`` ``shown`` is the whole roof.
 
     Errors and warnings as of ``run``; KeyboardInterrupt for Ctrl-C, and nothing is kept.
 
-    Examples
-    --------
     >>> roof = designed("notebooks/roof.toml")
     >>> roof.good, [f"{area:.0f}" for area in roof.certificate.patches["area"][:3]]
     (True, ['78', '174', '150'])
     """
-    if not isinstance(project, Project):
-        project = load(project)
+    project = project if isinstance(project, Project) else load(project)
     use_cache = use_cache and changed is None
-    known = cache.cached(project) if use_cache else None
-    if known is not None:
+    if use_cache and (known := cache.cached(project)) is not None:
         return replace(known, unfold=project.output.whole, project=project)
     outcome = solve_from_start(project, progress or ignore, changed)
     if use_cache:
@@ -105,27 +89,13 @@ def run(
 ) -> Outcome:
     """Mesh, solve, meet the targets, certify, and write all output of a project.
 
-    Parameters
-    ----------
-    path : the project file.
-    out_dir : folder for the output, made if it is missing; by default that of the project file.
-    progress : called with a few words at each step.
-    anyway : write the output even if the surface is not certified or misses a target.
+    ``out_dir`` is the folder for the output, made if it is missing; by default that of the project file.
+    ``progress`` is called with a few words at each step. If the surface is not certified or misses a target,
+    nothing is written and ``files`` is empty, unless ``anyway``.
 
-    Returns
-    -------
-    Outcome : ``files`` is empty, and nothing is written, if the surface is not certified or misses a target.
-
-    Raises
-    ------
     FileError, PlanError, OptionError : one line that names the file. Nothing is written.
-
-    Warns
-    -----
     BalanceWarning : before solving, if the tensions at a junction cannot balance.
 
-    Examples
-    --------
     >>> import tempfile
     >>> from pathlib import Path
     >>> plan = "[plan]\\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\\ntension = 3.0\\n"
@@ -137,8 +107,7 @@ def run(
     (True, 'STABLE', ['hall.pcmc'])
     """
     project = load(path)
-    project = project if out_dir is None else project.in_folder(out_dir)
-    return run_project(project, progress, anyway=anyway)
+    return run_project(project if out_dir is None else project.in_folder(out_dir), progress, anyway=anyway)
 
 
 def run_project(
@@ -188,11 +157,10 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
     start = given.changed(changed)
     project, surface = start.project or project, start.surface
     _check_wishes(project, surface, start.units)
-    swapped = False
     if project.swap:
         solved, swapped = solve_and_swap(project, surface, report)
     else:
-        solved = solve_project(project, surface, report)
+        solved, swapped = solve_project(project, surface, report), False
     notes = [*solved.notes]
     starts = [v for v in project.vary if v.value(surface) != v.value(given.surface)]  # given by ``changed``
     if starts:
@@ -216,22 +184,19 @@ def _check_wishes(project: Project, surface: Surface, units: Units) -> None:
     with in_file(project.path):
         structure, output = project.structure, project.output
         check_apexes(project.plan, surface, project.targets, units)
-        if project.output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
+        if output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
             text = "the roof has no mirror planes, so it is the whole already; leave out whole"
             raise OptionError(f"{text}, or give the plan mirrors", what="whole")
         if structure is not None and (output.structure is not None or structure.run):
             structure.check(surface, project.plan, output.whole)
-        if structure is not None and structure.run:
-            expect_program()
+            if structure.run:
+                expect_program()
         if project.pattern is not None and (output.pattern or output.report):
             of_material(project.pattern, structure, surface)
         if project.verify:
             expect_flat(surface, "verify")
-        if project.margin:
-            from ..accuracy.varied import Varied  # takes long to import
-
-            for what in project.margin:
-                Varied.of(surface, what)
+        for what in project.margin:
+            Varied.of(surface, what)
     pinchable = standing_part(surface).walls.pinchable
     if imbalance := unbalanced(surface, pinchable):
         unless = ", unless the junction rests on the plane" if pinchable.any() else ""

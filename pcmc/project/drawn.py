@@ -5,19 +5,18 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path, PureWindowsPath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ..base.arrays import toml
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
 from ..base.files import PathLike, as_path, check_name, check_regular
 from ..base.units import LENGTHS
+from ..plan.drawing import Drawing, read_drawing
+from ..plan.plan import Chosen
+from ..plan.proposal import proposed
+from ..plan.strokes import layer_of, read_strokes
 from .checking import in_file
-
-if TYPE_CHECKING:
-    from ..plan.drawing import Drawing
 
 DXF, RHINO = ".dxf", ".3dm"
 FALLBACK = "m"  # the unit of a project whose drawing has one that projects do not have
@@ -28,7 +27,6 @@ def is_drawing(path: Path) -> bool:
     suffix = path.suffix.lower()
     if suffix != RHINO:
         return suffix == DXF
-    from ..plan.strokes import layer_of, read_strokes
 
     with suppress(PcmcError, MissingExtra, OSError):  # the reader of surfaces has the better error
         for stroke in read_strokes(path).strokes:
@@ -56,68 +54,6 @@ def files_of(path: PathLike) -> list[Path]:
     return [path]
 
 
-@dataclass(frozen=True)
-class Chosen:
-    """What neither a project nor its drawing says: tensions of patches, walls and cables, edge length."""
-
-    tensions: Mapping[str, float] = field(default_factory=dict)
-    walls: Mapping[str, float] = field(default_factory=dict)
-    edge_length: float | None = None
-    cables: Mapping[str, float] = field(default_factory=dict)  # that of the outline has no name
-
-    @classmethod
-    def of(cls, given: Mapping[str, Any], full: Mapping[str, Any], drawing: Drawing) -> Chosen:
-        """What the ``full`` plan of a drawing has beyond the ``given`` one and the drawing."""
-
-        def named(key: str, has: str) -> set[str]:
-            entries = (entry for entry in given.get(key, []) if isinstance(entry, Mapping))
-            return {entry["name"] for entry in entries if has in entry and "name" in entry}
-
-        labelled = {label.name for label in drawing.labels if label.tension is not None}
-        labelled |= {name for name, values in given.get("patches", {}).items() if "tension" in values}
-        patches = {} if "tension" in given else full["patches"]
-        dividers = [
-            e for e in full["dividers"] if isinstance(e, Mapping) and e.get("name") in drawing.dividers
-        ]
-        walls = {e["name"]: e["wall"] for e in dividers if e["wall"] is not False}
-        cables = {e["name"]: e["tension"] for e in full.get("cables", []) if e.get("name") in drawing.cables}
-        outline = {"": full["cable"]} if "cable" in full and "cable" not in given else {}
-        return cls(
-            {name: patch["tension"] for name, patch in patches.items() if name not in labelled},
-            {name: wall for name, wall in walls.items() if name not in named("dividers", "wall")},
-            None if "edge_length" in given else full["edge_length"],
-            outline | {name: t for name, t in cables.items() if name not in named("cables", "tension")},
-        )
-
-    @property
-    def text(self) -> str:
-        """All of it in a line, with what to type to choose; empty if nothing was proposed.
-
-        >>> Chosen({"nave": 5.4}, {"chancel": 1.6}).text.split(" (")[0]
-        "chosen for what the project leaves open: tension 5.4 for 'nave'; wall 1.6 for 'chancel'"
-        """
-        named = next(iter(self.cables), "")  # the outline's cable has none
-        cable = "[[plan.cables]] name = {}, tension = ..." if named else "cable = ... under [plan]"
-        kinds = {
-            "tension": (self.tensions, "{} = {{tension = ...}} under [plan.patches]"),
-            "wall": (self.walls, "[[plan.dividers]] name = {}, wall = ..."),
-            "cable": (self.cables, cable),
-        }
-        parts, keys = [], []
-        for what, (values, key) in kinds.items():
-            groups: dict[float, list[str]] = {}  # the names of each value
-            for name, value in values.items():
-                groups.setdefault(value, []).append(repr(name) if name else "the outline")
-            parts += [f"{what} {value:g} for {', '.join(names)}" for value, names in groups.items()]
-            keys += [key.format(toml(name)) for name in list(values)[:1]]
-        if self.edge_length is not None:
-            parts.append(f"edges of {self.edge_length:g}")
-            keys.append("edge_length = ... under [plan]")
-        if not parts:
-            return ""
-        return f"chosen for what the project leaves open: {'; '.join(parts)} (to change: {'; '.join(keys)})"
-
-
 def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], Drawing | None, Chosen]:
     """The data of a project with its drawing's lines and what is proposed; the drawing; what was chosen.
 
@@ -135,18 +71,15 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
             raise FileError(text, what="plan.outline")
         check_beside(name, "drawing")
     drawing = drawing_of(path.parent / name, str(data.get("units", "")), gap)
-    from ..plan.proposal import proposed
 
     try:
-        lines = proposed(drawing, plan)
+        lines, chosen = proposed(drawing, plan)
     except OptionError as error:
         raise error.in_file(path, FileError) from None
-    full = {**data, "plan": lines}
-    if drawing.units:
-        full["units"] = drawing.units
+    full = {**data, "plan": lines} | ({"units": drawing.units} if drawing.units else {})
     if len(drawing.heights) and "targets" not in data:
         full["targets"] = {"meet": height_targets(drawing), "vary": list(lines["patches"])}
-    return full, drawing, Chosen.of(plan, lines, drawing)
+    return full, drawing, chosen
 
 
 def height_targets(drawing: Drawing) -> list[dict[str, Any]]:
@@ -185,9 +118,7 @@ def drawing_of(path: Path, units: str, gap: float | None) -> Drawing:
 
 @lru_cache(maxsize=8)  # a sweep loads its project for each case
 def _read(path: Path, units: str, gap: float | None, time: int, size: int) -> Drawing:
-    from ..plan.drawing import read_drawing
 
     drawing = read_drawing(path, units, gap)
-    if drawing.units and drawing.units not in LENGTHS:
-        return read_drawing(path, FALLBACK, gap)
-    return drawing
+    unknown = drawing.units not in ("", *LENGTHS)
+    return read_drawing(path, FALLBACK, gap) if unknown else drawing

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,19 +17,17 @@ from ..base import validate
 from ..base.arrays import toml
 from ..base.errors import FileError, FileWarning, OptionError, PcmcError, unknown
 from ..base.files import PathLike, as_path, check_regular, system_error
-from ..base.libraries import require
 from ..base.units import NO_UNITS, Units, unlikely_size
 from ..cloth.settings import CuttingOptions
+from ..design import Parameter, Target
 from ..plan import Plan, plan_from
+from ..plan.drawing import Drawing
+from ..plan.proposal import edge_length_for
 from ..solvers import find_method
 from ..structure.section import Structure, check_members
 from .checking import check_project_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
 from .settings import AccuracyWanted, MeshFile, Output, Remeshing, section_of
-
-if TYPE_CHECKING:
-    from ..design import Parameter, Target
-    from ..plan.drawing import Drawing
 
 TOML = ".toml"
 ELSEWHERE = "name files in it, and give --folder to write them elsewhere"
@@ -70,18 +68,18 @@ class Project:
 
     def __post_init__(self) -> None:
         order, output = self.options.get("order"), self.output
-        flat = {
-            "solve.accuracy": self.wanted.accuracy,
-            "solve.margin": self.margin,
-            "solve.verify": self.verify,
+        flat: dict[str, Any] = {
+            "accuracy": self.wanted.accuracy,
+            "margin": self.margin,
+            "verify": self.verify,
         }
+        flat = {f"solve.{key}": wanted for key, wanted in flat.items()}
         flat |= {f"output.{key}": getattr(output, key) for key in ("net", "structure", "tolerance")}
         flat |= {"pattern": self.pattern, "structure.run": self.structure is not None and self.structure.run}
         for key in (key for key, wanted in flat.items() if wanted and order not in (None, 1)):
             text = f"the elements are curved, of order {order}, and {key} is for flat triangles alone; type"
-            raise OptionError(
-                f"{text} order = 1 under [solve], or leave it out", what="solve.order", found=order
-            )
+            text += " order = 1 under [solve], or leave it out"
+            raise OptionError(text, what="solve.order", found=order)
 
     @property
     def inputs(self) -> list[Path]:
@@ -138,18 +136,11 @@ def load(path: PathLike, *, units: str = "") -> Project:
     ``units`` is the unit of length of a drawing's or a mesh's project: a file in another one is converted, a
     file without a unit is taken to be in it. A project file says itself which it has.
 
-    Raises
-    ------
     FileError : the file is no TOML, or a key is unknown, missing or bad; ``what`` is the key.
     PlanError : a drawing is no plan; ``what`` is its layer.
-
-    Warns
-    -----
     FileWarning : for what was changed and left out of a drawing, a plan whose size is unlikely in its unit,
-        and a roof held at single points inside.
+    and a roof held at single points inside.
 
-    Examples
-    --------
     >>> import tempfile
     >>> text = 'units = "mm"\\n[plan]\\noutline = [[0, 0], [6000, 0], [6000, 4000]]\\ntension = 3.0'
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -172,8 +163,7 @@ def load(path: PathLike, *, units: str = "") -> Project:
         text = f"{project.drawing.path}: {'; '.join(project.drawing.notes)}"
         warnings.warn(text, FileWarning, stacklevel=2)
     elif project.drawing is None and project.plan is not None:
-        corners = project.plan.outline.at(project.plan.outline.dense)
-        width = float(np.ptp(corners, axis=0).max())
+        width = float(np.ptp(project.plan.outline.at(project.plan.outline.dense), axis=0).max())
         for note in filter(None, (mast_note(project.plan), unlikely_size(width, project.units.length))):
             warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
     return project
@@ -268,17 +258,13 @@ def project_of(
         structure = Structure(**data["structure"]) if "structure" in data else None
         pattern = section_of(CuttingOptions, "pattern", data["pattern"]) if "pattern" in data else None
         output.check(units, structure, pattern)
-        values |= {"output": output, "units": units, "drawing": drawing}
-        values |= {"structure": structure, "pattern": pattern}
+        values |= {"output": output, "units": units, "structure": structure, "pattern": pattern}
         stages = stages if isinstance(stages, list) else [stages]
         values["remeshing"] = [section_of(Remeshing, "remesh", stage) for stage in stages]
-        plan, targets, vary = None, list["Target"](), list["Parameter"]()
+        plan, targets, vary = None, list[Target](), list[Parameter]()
         if mesh is None:
             plan = plan_from(data["plan"])
             if "edge_length" not in data["plan"]:
-                require("shapely", extra="plan")
-                from ..plan.proposal import edge_length_for
-
                 plan = replace(plan, edge_length=edge_length_for(plan))
                 chosen = replace(chosen, edge_length=plan.edge_length)
             plan, targets, vary = with_rises(plan if redrawn is None else redrawn(plan), rises)
@@ -301,7 +287,7 @@ def project_of(
                 _check_sought_once(rises, sought, plan)
             targets, vary = [*own, *targets], [*sought, *vary]
             values["target_tolerance"] = data["targets"].get("tolerance")
-        values |= {"targets": targets, "vary": vary, "rises": rises, "chosen": chosen}
+        values |= {"targets": targets, "vary": vary, "rises": rises, "chosen": chosen, "drawing": drawing}
         return Project(path, plan, mesh, text, given, **values)
 
 
@@ -309,10 +295,9 @@ def _solving(table: Mapping[str, Any]) -> dict[str, Any]:
     """What [solve] says, as values of a Project; bad ones are refused before the plan is meshed."""
     given = {name: table[name] for name in ("method", "mesh_check", "margin", "verify") if name in table}
     accuracy = {name: table[name] for name in vars(AccuracyWanted()) if name in table}
-    given["wanted"] = section_of(AccuracyWanted, "solve", accuracy)
-    given["options"] = {name: v for name, v in table.items() if name not in given and name not in accuracy}
-    find_method(given.get("method", "newton")).options(**given["options"])
-    return given
+    options = {name: v for name, v in table.items() if name not in given and name not in accuracy}
+    find_method(given.get("method", "newton")).options(**options)
+    return given | {"wanted": section_of(AccuracyWanted, "solve", accuracy), "options": options}
 
 
 def _output(table: Mapping[str, Any]) -> Output:
@@ -328,8 +313,6 @@ def _output(table: Mapping[str, Any]) -> Output:
 
 
 def _search(table: Mapping[str, Any], plan: Plan | None) -> tuple[list[Target], list[Parameter]]:
-    """The targets of a project, and the parameters that may vary."""
-    from ..design import Parameter, Target
 
     if "tolerance" in table:
         validate.positive("targets.tolerance", table["tolerance"])
@@ -338,31 +321,27 @@ def _search(table: Mapping[str, Any], plan: Plan | None) -> tuple[list[Target], 
             raise OptionError(f"targets.{key} is empty; give at least one", what=f"targets.{key}")
     points, targets = {} if plan is None else plan.points, []
     for entry in table["meet"]:
-        name, place = entry.get("of"), {}
+        name = entry.get("of")
         if entry["quantity"] == "height" and isinstance(name, str):
             if name not in points:
                 text = f"targets.meet: {unknown('point', name, points)}; name it in [plan.points]"
                 raise OptionError(text, what="targets.meet", found=name)
-            place = {"of": points[name], "name": name}
-        targets.append(Target(**{**entry, **place}))
+            entry = {**entry, "of": points[name], "name": name}
+        targets.append(Target(**entry))
     return targets, [Parameter(**v) if isinstance(v, Mapping) else Parameter(v) for v in table["vary"]]
 
 
 def _check_sought_once(rises: Sequence[Rise], vary: Sequence[Parameter], plan: Plan) -> None:
-    """Refuse a tension that both a rise and [targets] find."""
     for rise in rises:
-        areas = [area.name for area in plan.patches] or ["patch 1"]
-        own = areas if rise.patch is None else [rise.patch]
-        both = [n for parameter in vary if parameter.kind == "tension" for n in parameter.names if n in own]
-        if not both:
-            continue
-        left = [(p, [n for n in p.names if p.kind != "tension" or n not in own]) for p in vary]
-        others = [replace(parameter, patch=names).plain for parameter, names in left if names]
-        change = f"type vary = {toml(others)}" if others else "remove vary and its targets"
-        where = "[plan]" if rise.patch is None else f"patch {rise.patch!r}"
-        text = f"targets.vary: the tension of {both[0]!r} is found for the {rise.kind} of {where}, too;"
-        text += f" {change}, or give {where} tension = instead of {rise.kind} ="
-        raise OptionError(text, what="targets.vary", where=both[0], found=both[0])
+        own = ([area.name for area in plan.patches] or ["patch 1"]) if rise.patch is None else [rise.patch]
+        for both in (n for p in vary if p.kind == "tension" for n in p.names if n in own):
+            left = [(p, [n for n in p.names if p.kind != "tension" or n not in own]) for p in vary]
+            others = [replace(parameter, patch=names).plain for parameter, names in left if names]
+            change = f"type vary = {toml(others)}" if others else "remove vary and its targets"
+            where = "[plan]" if rise.patch is None else f"patch {rise.patch!r}"
+            text = f"targets.vary: the tension of {both!r} is found for the {rise.kind} of {where}, too;"
+            text += f" {change}, or give {where} tension = instead of {rise.kind} ="
+            raise OptionError(text, what="targets.vary", where=both, found=both)
 
 
 def with_rise(project: Project, wanted: Mapping[str, float | None]) -> Project:
@@ -374,8 +353,7 @@ def with_rise(project: Project, wanted: Mapping[str, float | None]) -> Project:
     if others:
         raise OptionError(f"{flag} and {others[0]}: give one of them, the other follows", what=flag)
     if project.targets or (project.mesh is not None and project.mesh.rises):
-        text = f"{flag}: {project.path.name} has targets already; change them there"
-        raise OptionError(text, what=flag)
+        raise OptionError(f"{flag}: {project.path.name} has targets already; change them there", what=flag)
     if project.mesh is not None:
         if rises[0].kind not in RISES:
             raise OptionError(f"{flag}: is for a plan, and here is a mesh; give --rise or --apex", what=flag)

@@ -14,6 +14,9 @@ from ..advice.rises import RISES
 from ..advice.rises import WHOLE as WHOLE_RISES
 from ..base.units import FORCES, LENGTHS
 from ..cloth.settings import CuttingOptions
+from ..design import Parameter, Target
+from ..design.targets import KINDS as KINDS_OF_PARAMETER
+from ..design.targets import MEASURES, SHORT
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, WALL, RoomData
 from ..solvers import METHODS, find_method
@@ -70,7 +73,7 @@ def _list_of(*schemas: Schema) -> Schema:
     return {"type": "array", "items": _any_of(*schemas)}
 
 
-KINDS: dict[str, Schema] = {
+KINDS: dict[str, Schema] = {  # what the value of a key may be, in words and as a JSON Schema
     "a value": {},
     "a number": _NUMBER,
     WALL: _any_of(_NUMBER, {"enum": [BALANCED, False]}),
@@ -100,20 +103,13 @@ KINDS: dict[str, Schema] = {
     "a list of views": _list_of(_NAME, _LIST),
     "a name or two angles": _any_of(_NAME, _LIST),
 }
-"""What the value of a key may be, in words and as a JSON Schema."""
 
-_TYPES: dict[str, Any] = {
-    "number": int | float,
-    "integer": int,
-    "boolean": bool,
-    "string": str,
-    "array": list,
-    "object": Mapping,
-}
+_TYPES: dict[str, Any] = {"number": int | float, "integer": int, "boolean": bool, "string": str}
+_TYPES |= {"array": list, "object": Mapping}
 _KIND_OF_TYPE = {"float": "a number", "int": "a whole number", "bool": "true or false", "Plane": "a table"}
 _KIND_OF_TYPE |= {"str": "a text", "PathLike": "a text", "Mapping": "a table"}
-_CHOICES = {"target": ("minimum", "stationary"), "armijo": ("printed", "sufficient")}  # of solvers' options
 _KIND_OF_TYPE |= {"Sequence": "a list of names", "tuple": "a list of names"}
+_CHOICES = {"target": ("minimum", "stationary"), "armijo": ("printed", "sufficient")}  # of solvers' options
 
 
 def fits(value: Any, schema: Schema) -> bool:
@@ -159,9 +155,8 @@ class Section:
     @property
     def title(self) -> str:
         """What a message calls it."""
-        return (
-            f"[{self.name}]{self.condition and f' with {self.condition}'}" if self.name else "the file itself"
-        )
+        condition = self.condition and f" with {self.condition}"
+        return f"[{self.name}]{condition}" if self.name else "the file itself"
 
     def example(self, key: str) -> str:
         """The end of a message about a key: what to type for it; empty where ``EXAMPLES`` have none."""
@@ -191,11 +186,8 @@ def _of_class(cls: Any, **special: str | Sequence[str]) -> tuple[Key, ...]:
 
 def _rise_keys(how: str, names: Sequence[str] = RISES) -> tuple[Key, ...]:
     """Keys for the height of a roof, from which its tension is found."""
-    meanings = {
-        "rise": "the height over a level outline",
-        "apex": "the greatest height over the plane",
-        "span_ratio": "the span of the plan, the diameter of the largest circle in it, over the rise",
-    }
+    meanings = {"rise": "the height over a level outline", "apex": "the greatest height over the plane"}
+    meanings["span_ratio"] = "the span of the plan, the diameter of the largest circle in it, over the rise"
     return tuple(Key(name, "a number", None, f"{meanings[name]}, {how}") for name in names)
 
 
@@ -224,10 +216,8 @@ def main_sections() -> tuple[Section, ...]:
     specs = [key for key in _of_class(PatchSpec) if key.name != "name"]
     patch = [replace(key, unless=RISES) if key.name == "tension" else key for key in specs]
     patch += _rise_keys("instead of a tension, which is found")
-    plane = (
-        Key("point", "a point [x, y, z]", Plane().point, "a point of Π"),
-        Key("normal", "a point [x, y, z]", Plane().normal, "its normal, of any length"),
-    )
+    plane = [Key("point", "a point [x, y, z]", Plane().point, "a point of Π")]
+    plane += [Key("normal", "a point [x, y, z]", Plane().normal, "its normal, of any length")]
     mesh = [key for key in _of_class(MeshFile) if key.name != "rises"]
     mesh += _rise_keys("found by one tension of all patches under pressure")
     mesh_patch = [replace(key, default=None) for key in specs if key.name in PATCH_KEYS]
@@ -256,7 +246,7 @@ def main_sections() -> tuple[Section, ...]:
         Section("plan.holes", "An opening. A curve alone is a hole, too.", _of_class(Hole)),
         Section("plan.cables", help_of["cable"], cables),
         Section("plan.rooms.NAME", "A room under several patches; NAME is its name.", rooms),
-        Section("plan.plane", "The plane Π.", plane),
+        Section("plan.plane", "The plane Π.", tuple(plane)),
         Section("mesh", "The roof, by the triangles in a file.", tuple(mesh)),
         Section("mesh.patches.NAME", "A patch of the mesh; NAME is its name.", tuple(mesh_patch)),
         Section("remesh", help_of["remesh"], _of_class(Remeshing)),
@@ -278,37 +268,26 @@ def solve_section(method: str) -> Section:
         Key("margin", "a list of names", (), MARGIN),
         Key("verify", "true or false", False, PROVED),
     )
-    help = "The solver and its options."
     if method not in METHODS:
-        return Section("solve", help, keys)
+        return Section("solve", "The solver and its options.", keys)
     keys += _of_class(find_method(method).options, **_CHOICES)
-    if method == "newton":
-        keys += _of_class(AccuracyWanted)
-    return Section("solve", help, keys, f'method = "{method}"')
+    keys += _of_class(AccuracyWanted) if method == "newton" else ()
+    return Section("solve", "The solver and its options.", keys, f'method = "{method}"')
 
 
 @cache
 def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
-    from ..design import Parameter, Target  # needed by projects with targets only
-    from ..design.targets import KINDS as KINDS_OF_PARAMETER
-    from ..design.targets import MEASURES, SHORT
 
     wanted = _of_class(Target, quantity=(*MEASURES, *SHORT), of="a name or a point [x, y]")
     changing = _of_class(Parameter, patch="a name or a list of names", kind=KINDS_OF_PARAMETER)
-    return (
-        Section(
-            "targets",
-            "Quantities to be met by changing tensions, pressures, cables, weights or volumes.",
-            (
-                Key("meet", "a list of tables", REQUIRED, "the quantities and their values"),
-                Key("vary", "a list of names, lists of names, or tables", REQUIRED, VARIED),
-                Key("tolerance", "a number", 1e-7, "largest relative misfit of a target that counts as met"),
-            ),
-        ),
-        Section("targets.meet", "A quantity and what it is to be.", wanted),
-        Section("targets.vary", "What may change.", changing),
-    )
+    meet = Key("meet", "a list of tables", REQUIRED, "the quantities and their values")
+    vary = Key("vary", "a list of names, lists of names, or tables", REQUIRED, VARIED)
+    misfit = Key("tolerance", "a number", 1e-7, "largest relative misfit of a target that counts as met")
+    help = "Quantities to be met by changing tensions, pressures, cables, weights or volumes."
+    targets = Section("targets", help, (meet, vary, misfit))
+    quantity = Section("targets.meet", "A quantity and what it is to be.", wanted)
+    return (targets, quantity, Section("targets.vary", "What may change.", changing))
 
 
 ELLIPSE = "{centre = [x, y], axes = [[a, b], [c, d]], sweep = degrees}; without sweep the whole ellipse"
@@ -334,8 +313,7 @@ def sections() -> tuple[Section, ...]:
     >>> [key.name for key in sections()[0].keys]
     ['units', 'force', 'plan', 'mesh', 'solve', 'remesh', 'targets', 'structure', 'pattern', 'output']
     """
-    solve = (solve_section(method) for method in METHODS)
-    return (*main_sections(), *solve, *target_sections(), CURVE)
+    return (*main_sections(), *map(solve_section, METHODS), *target_sections(), CURVE)
 
 
 def reference() -> str:
@@ -373,15 +351,13 @@ def json_schema() -> Schema:
 
 
 def _table(name: str) -> Schema:
-    """The schema of a section, with those below it."""
     known = [section for section in sections() if section.name == name]
     keys = [*(key for section in known for key in section.keys), *(CURVE.keys if name in OR_CURVE else ())]
     properties: Schema = {}
     for key in keys:
         place = f"{name}.{key.name}".lstrip(".")
-        below = {section.name for section in sections()} & {place, f"{place}.NAME"}
         entry = KINDS[key.kind]
-        for one in below:
+        for one in {section.name for section in sections()} & {place, f"{place}.NAME"}:
             inner = _table(one)
             entry = _filled(entry, inner if one == place else TABLE | {"additionalProperties": inner})
         entry = entry | {"description": key.help.replace("``", "`")}
@@ -391,9 +367,8 @@ def _table(name: str) -> Schema:
 
 
 def _filled(schema: Schema, table: Schema) -> Schema:
-    """The schema of a kind, with the keys of the tables in it."""
     if schema == TABLE:
         return table
-    parts: Schema = {key: _filled(value, table) for key, value in schema.items() if key == "items"}
-    parts |= {key: [_filled(one, table) for one in value] for key, value in schema.items() if key == "anyOf"}
-    return schema | parts
+    items = {"items": _filled(schema["items"], table)} if "items" in schema else {}
+    choices = {"anyOf": [_filled(one, table) for one in schema["anyOf"]]} if "anyOf" in schema else {}
+    return schema | items | choices

@@ -26,9 +26,8 @@ def model_with_members(
     """The structural model of what is shown, or of another surface of the project; None without members (nor,
     if they count, ``cables``), or where one cannot be there, as in a mirror plane."""
     project = outcome.project
-    if project is None or project.structure is None:
-        return None
-    if not (has_members(outcome) or (cables and outcome.surface.cables)):
+    counts = has_members(outcome) or (cables and outcome.surface.cables)
+    if project is None or project.structure is None or not counts:
         return None
     try:
         if surface is None:

@@ -6,30 +6,29 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
+from ..accuracy import AccurateResult, Margin, MeshCheck, check_mesh, margin
 from ..base.errors import OptionError, PcmcError
 from ..base.units import NO_UNITS, Units
 from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate, certify
+from ..certificate.quantities import Figure, figures
+from ..certificate.theorem import Theorem, verify
+from ..cloth import CuttingOptions, CuttingPattern, cutting_pattern_of
+from ..design import Design
+from ..drawings import DrawingSet, drawing_set
+from ..drawings.sheet import MISSED
+from ..io.mesh_data import MeshData
+from ..panelling import FewerFamilies, PanelNet, Panels, fewer_families, panel_net, panels
+from ..report import RoofReport, roof_report
 from ..solvers.result import Progress, Result
+from ..structure import Analysis, StructuralModel, analyse
+from ..structure.section import Structure
 from ..surface import Surface, mirrored
+from .file import Project
+from .members import members_drawn, model_with_members, warn_of_members
 from .settings import Output, of_material
-
-if TYPE_CHECKING:
-    from ..accuracy import AccurateResult, Margin, MeshCheck
-    from ..certificate.quantities import Figure
-    from ..certificate.theorem import Theorem
-    from ..cloth import CuttingOptions, CuttingPattern
-    from ..design import Design
-    from ..drawings import DrawingSet
-    from ..io.mesh_data import MeshData
-    from ..panelling import FewerFamilies, PanelNet, Panels
-    from ..report import RoofReport
-    from ..structure import Analysis
-    from ..structure.model import StructuralModel
-    from ..structure.section import Structure
-    from .file import Project
 
 MOST_CHECKED = 20_000  # triangles up to which the mesh is checked by default
 EXTENSIVE = ("area", "volume", "length")  # targets of a part that are not those of the whole
@@ -101,15 +100,12 @@ class Outcome:
     def __repr__(self) -> str:
         """The verdict, what the targets reached, what was written, and the advice, above the surface."""
         (surface, certificate), design, units = self.shown, self.design, self.units
-        lines = [
-            certificate.verdict.value,
-            certificate.cuts_itself if certificate.certified else certificate.detail,
-            "" if design is None else f"targets {design.text(units)}",
-            f"written: {', '.join(map(str, self.files))}" if self.files else "",
-            "\n  ".join(self.advice),
-            units.sentence if units else "",
-        ]
-        return "\n".join([*filter(None, lines), repr(surface)])
+        lines = [certificate.verdict.value]
+        lines += [certificate.cuts_itself if certificate.certified else certificate.detail]
+        lines += [f"targets {design.text(units)}"] if design is not None else []
+        lines += [f"written: {', '.join(map(str, self.files))}"] if self.files else []
+        lines += ["\n  ".join(self.advice), units.sentence if units else "", repr(surface)]
+        return "\n".join(filter(None, lines))
 
     @property
     def solved(self) -> Result:
@@ -147,14 +143,12 @@ class Outcome:
     @property
     def figures(self) -> list[Figure]:
         """The key figures of what is shown."""
-        from ..certificate.quantities import figures
 
         return self._once("figures", lambda: figures(*self.shown))
 
     @property
     def theorem(self) -> Theorem:
         """What ``pcmc.verify`` proves of what is shown."""
-        from ..certificate.theorem import verify
 
         return self._once("theorem", lambda: verify(self.shown.surface))
 
@@ -163,17 +157,14 @@ class Outcome:
         """How the solver ended, and the verdict's detail; without the hint for a strained junction that the
         advice takes the place of."""
         message, detail = self.solved.message, self.certificate.detail
-        if self.advice:
-            strained = strained_junction(self.surface)
-            if strained is not None:
-                message, detail = (text.replace(strained.hint, "") for text in (message, detail))
+        if self.advice and (strained := strained_junction(self.surface)) is not None:
+            message, detail = (text.replace(strained.hint, "") for text in (message, detail))
         return message, detail
 
     @property
     def mark(self) -> str:
         """What files, pictures and documents are marked with; empty where all is in order, and where
         nothing is known, as of a surface that another program wrote."""
-        from ..drawings.sheet import MISSED
 
         if self.result is None:
             return str(self.data.certificate.get("mark", "")) if self.data else ""
@@ -192,7 +183,7 @@ class Outcome:
 
     @property
     def name(self) -> str:
-        """The name of the roof: of its file, without suffix."""
+        """The name of its file, without suffix."""
         return "" if self.project is None else self.project.path.stem
 
     @property
@@ -201,7 +192,6 @@ class Outcome:
         return Output() if self.project is None else self.project.output
 
     def _once(self, key: Any, compute: Callable[[], Finding]) -> Finding:
-        """A finding about what is shown, computed the first time."""
         key = (self.unfold, key)
         if key not in self._known:
             self._known[key] = compute()
@@ -211,30 +201,25 @@ class Outcome:
         self, tolerance: float, *, mirror_images: str = "alike", walls: bool = False, anyway: bool = False
     ) -> Panels:
         """The schedule of the panels of what is shown; see ``pcmc.panels``."""
-        from ..panelling import panels
 
         surface, certificate = self.shown
-        options: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": anyway}
-        sort = partial(panels, surface, tolerance, **options, certificate=certificate)
-        return self._once(("panels", tolerance, mirror_images, walls), sort)
+        how: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
+        sort = partial(panels, surface, tolerance, **how, anyway=anyway, certificate=certificate)
+        return self._once(("panels", tolerance, *how.values()), sort)
 
     def fewer_families(self, tolerance: float, change: float, **options: Any) -> FewerFamilies:
         """What is shown with fewer families of panels; see ``pcmc.fewer_families``."""
-        from ..panelling import fewer_families
 
         return fewer_families(self.shown.surface, tolerance, change, **options)
 
     def panel_net(self, size: float, pattern: str, direction: float, anyway: bool = False) -> PanelNet:
         """Quads or hexagons on what is shown; see ``pcmc.panel_net``."""
-        from ..panelling import panel_net
 
         surface, certificate = self.shown
         return panel_net(surface, size, pattern, direction=direction, anyway=anyway, certificate=certificate)
 
     def drawing_set(self, output: Output, *, anyway: bool = False, **options: Any) -> DrawingSet:
         """The drawings of what is shown, as ``output`` says; ``options`` as of ``pcmc.drawing_set``."""
-        from ..drawings import drawing_set
-        from .members import members_drawn, warn_of_members
 
         warn_of_members(self, "drawings", held=True)
         options |= {"sheet": output.sheet, "panel_sheets": output.panel_sheets}
@@ -243,40 +228,25 @@ class Outcome:
 
     def report(self, output: Output, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
         """The report on what is shown, with the mesh check if it was made."""
-        from ..report import roof_report
-        from .members import model_with_members, warn_of_members
 
-        analysis, project = self.analysis(anyway), self.project
-        wanted = None if project is None else project.pattern
-        if analysis is None:
+        about, project = self._about(output, anyway), self.project
+        about |= {"mesh_check": self.mesh_check, "mesh_failure": self.mesh_failure, "margins": self.margins}
+        about |= {"files": files, "date": output.date, "figures": self.figures}
+        if self.design is not None:
+            about["targets"] = self.design.targets
+        if project is not None and project.verify:
+            about["theorem"] = self.theorem
+        if project is not None and project.pattern is not None:
+            about["pattern"] = self.cutting_pattern(project.pattern, anyway)
+        if (analysis := self.analysis(anyway)) is None:
             warn_of_members(self, "report", held=True)
-        return roof_report(
-            self.shown.surface,
-            self.units,
-            **self._about(output, anyway),
-            mesh_check=self.mesh_check,
-            mesh_failure=self.mesh_failure,
-            margins=self.margins,
-            analysis=analysis,
-            model=model_with_members(self) if analysis is None else None,
-            pattern=None if wanted is None else self.cutting_pattern(wanted, anyway),
-            theorem=self.theorem if project is not None and project.verify else None,
-            targets=None if self.design is None else self.design.targets,
-            files=files,
-            date=output.date,
-            figures=self.figures,
-        )
+            about["model"] = model_with_members(self)
+        return roof_report(self.shown.surface, self.units, **about, analysis=analysis)
 
     def _about(self, output: Output, anyway: bool) -> dict[str, Any]:
-        """What drawings and report have in common."""
-        tolerance = output.tolerance
-        return {
-            "name": self.name,
-            "tolerance": tolerance,
-            "schedule": None if tolerance is None else self.panels(tolerance, anyway=anyway),
-            "certificate": self.shown.certificate,
-            "anyway": anyway,
-        }
+        tolerance, certificate = output.tolerance, self.shown.certificate
+        about = {"name": self.name, "tolerance": tolerance, "certificate": certificate, "anyway": anyway}
+        return about | ({} if tolerance is None else {"schedule": self.panels(tolerance, anyway=anyway)})
 
     def model(self, structure: Structure, anyway: bool = False) -> StructuralModel:
         """The structural model of what is shown."""
@@ -293,17 +263,17 @@ class Outcome:
 
     def cutting_pattern(self, wanted: CuttingOptions, anyway: bool = False) -> CuttingPattern:
         """The cutting pattern of what is shown, of the cloth in [structure]; made once for [pattern]."""
-        from ..cloth import cutting_pattern_of
 
         surface, certificate = self.shown
-        project = self.project
+        project, cloth = self.project, wanted
         structure = None if project is None else project.structure
-        own, cloth = project is not None and wanted is project.pattern, wanted
         if self.unfold:
             cloth = wanted.of_whole(self.surface, surface)
             structure = structure and structure.of_whole(self.surface, surface, None)
-        cloth = of_material(cloth, structure, surface)
-        cut = partial(cutting_pattern_of, surface, cloth, anyway, certificate)
+        cut = partial(
+            cutting_pattern_of, surface, of_material(cloth, structure, surface), anyway, certificate
+        )
+        own = project is not None and wanted is project.pattern
         return self._once("cutting pattern", cut) if own else cut()
 
     def analysis(self, anyway: bool = False, progress: OnStep | None = None) -> Analysis | None:
@@ -311,7 +281,6 @@ class Outcome:
         structure = None if self.project is None else self.project.structure
         if structure is None or not structure.run:
             return None
-        from ..structure import analyse
 
         return self._once("analysis", lambda: analyse(self.model(structure, anyway), progress=progress))
 
@@ -343,7 +312,6 @@ class Outcome:
     def check_mesh(self, progress: OnStep | None = None, meshes: int | None = None) -> MeshCheck | None:
         """The mesh check of what is shown, made once, by default on three ``meshes``; None where it fails,
         see ``mesh_failure``. With a number of ``meshes`` an error is raised."""
-        from ..accuracy import check_mesh  # takes long to import
 
         def check() -> MeshCheck | None:
             found = None if self.unfold else self.accurate
@@ -351,8 +319,7 @@ class Outcome:
                 return found.check
             given = self.result if self.result is not None and not self.unfold else self.shown.surface
             try:
-                callback = _reporter("mesh check", progress)
-                return check_mesh(given, meshes or 3, callback=callback)
+                return check_mesh(given, meshes or 3, callback=_reporter("mesh check", progress))
             except PcmcError as error:  # the roof is good without it
                 if meshes is not None:
                     raise
@@ -374,7 +341,6 @@ class Outcome:
 
     def margin(self, what: str, progress: OnStep | None = None) -> Margin:
         """How far what is shown is from the edge, found once; see ``pcmc.margin``, also for the errors."""
-        from ..accuracy import margin  # takes long to import
 
         surface, certificate = self.shown
         callback = _reporter(f"margin of {what}", progress)
@@ -388,8 +354,6 @@ class Outcome:
 
 
 def _reporter(what: str, progress: OnStep | None) -> Callable[[Progress], None]:
-    """A solver's callback that reports its mesh and step."""
-
     def callback(state: Progress) -> None:
         if progress is not None:
             progress(f"{what}: {state.surface().m} triangles, step {state.iteration}")

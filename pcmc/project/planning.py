@@ -6,19 +6,19 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..base.arrays import toml, toml_key
 from ..base.errors import FileError
 from ..base.files import PathLike
 from ..plan import plan_from
+from ..plan.drawing import Drawing
+from ..plan.proposal import proposed
+from ..surface.curve_data import curve_data
 from ..surface.curves import Curve
 from .drawn import FALLBACK, LENGTHS, drawing_of, height_targets
 from .file import Project
 from .start import surface_of
-
-if TYPE_CHECKING:
-    from ..plan.drawing import Drawing
 
 SHARPER = " # tension of the wall; more gives a sharper valley"
 
@@ -50,13 +50,12 @@ def project_text(
     ``units``: by default the drawing's. ``gap``: gaps up to it are closed. ``refer``: by name, instead of
     its lines; ``folder`` is the project's, by default the drawing's. FileError, PlanError, MissingExtra.
     """
-    from ..plan.proposal import proposed
 
     path = Path(path)
     project = Path(folder or path.parent) / path.with_suffix(".toml").name
     name = drawing_reference(path, project) if refer else ""
     drawing = drawing_of(path, units, gap)
-    values = proposed(drawing)
+    values, _ = proposed(drawing)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # no project is written that cannot be meshed
         surface_of(Project(path, plan_from(values), drawing=drawing))
@@ -97,14 +96,9 @@ def _text(drawing: Drawing, values: Mapping[str, Any], name: str, gap: float | N
     if len(drawing.heights) and not name:
         lines += ["", "[targets]", f"meet = {_list(height_targets(drawing))}"]
         lines.append(f"vary = {toml(list(values['patches']))} # the tensions that may change for it")
-    stem = drawing.path.stem
-    lines += [
-        "",
-        "[output]",
-        f"files = {toml([f'{stem}-roof.3dm'])}",
-        f"picture = {toml(f'{stem}-roof.png')}",
-    ]
-    return "\n".join([*lines, ""])
+    roof = f"{drawing.path.stem}-roof"
+    lines += ["", "[output]", f"files = {toml([f'{roof}.3dm'])}", f"picture = {toml(f'{roof}.png')}", ""]
+    return "\n".join(lines)
 
 
 def proposal_text(project: Project) -> str:
@@ -130,7 +124,6 @@ def proposal_text(project: Project) -> str:
 
 def _curve(curve: Any, closed: bool = False) -> str:
     """A curve, or a point, in TOML, a line for each part; where all are ``closed``, none says it."""
-    from ..surface.curve_data import curve_data
 
     data = curve_data(curve) if isinstance(curve, Curve) else [float(f"{x:.12g}") for x in curve]
     if closed and isinstance(data, Mapping) and data.get("closed"):

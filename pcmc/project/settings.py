@@ -60,8 +60,7 @@ def section_of(kind: type[SECTION], name: str, table: Mapping[str, Any]) -> SECT
     try:
         return kind(**table)
     except OptionError as error:
-        what = f"{name}.{error.what}" if error.what else name
-        raise OptionError(f"{name}: {error}", what=what, found=error.found) from None
+        raise error.in_file(name, what=f"{name}.{error.what}" if error.what else name) from None
 
 
 @dataclass(frozen=True)
@@ -148,9 +147,8 @@ class AccuracyWanted:
         validate.integer("most_triangles", self.most_triangles, least=1)
         if self.accuracy:
             object.__setattr__(self, "accuracy", accuracies(self.accuracy))
-            return
-        for name, usual in (("accuracy_of", "mesh"), ("most_triangles", TRIANGLES)):
-            if getattr(self, name) != usual:
+        for name in () if self.accuracy else ("accuracy_of", "most_triangles"):
+            if getattr(self, name) != getattr(AccuracyWanted, name):
                 text = f"{name}: counts only with an accuracy; give accuracy, too, or leave it out"
                 raise OptionError(text, what=name, found=getattr(self, name))
 
@@ -249,16 +247,16 @@ class Output:
     @property
     def paths(self) -> list[Path]:
         """All files that are known before the roof is; sheets as .svg get numbers."""
-        others = schedule_paths(Path(self.panels))[1:] if self.panels is not None else []
+        paths = [*map(Path, self.names), *(schedule_paths(Path(self.panels))[1:] if self.panels else ())]
         for files, tables in ((self.pattern, PATTERN_TABLES), (self.net, NET_TABLES)):
-            others += [path for file in files for path in table_paths(Path(file), tables)[1:]]
-        return [Path(name) for name in self.names] + others
+            paths += [path for file in files for path in table_paths(Path(file), tables)[1:]]
+        return paths
 
     def in_folder(self, folder: Path) -> Output:
         """The same output in a folder."""
-        single = {name: folder / path for name in SINGLE if (path := getattr(self, name)) is not None}
         lists: dict[str, Any] = {name: [folder / path for path in getattr(self, name)] for name in LISTS}
-        return replace(self, **lists, **single)
+        lists |= {name: folder / path for name in SINGLE if (path := getattr(self, name)) is not None}
+        return replace(self, **lists)
 
     def check(self, units: Units, structure: Structure | None, pattern: CuttingOptions | None) -> None:
         """Refuse documents that need a unit of length or a section which the project does not have."""
@@ -281,8 +279,7 @@ def of_material(pattern: CuttingOptions, structure: Structure | None, surface: S
         return pattern
     values: dict[str, dict[str, Any]] = {key: {} for key in ("stiffness", "poisson", "direction")}
     given, thicknesses = structure.materials(surface), structure.thicknesses(surface)
-    for patch in np.array(surface.patches, dtype=object)[surface.roof]:
-        name = patch.name
+    for name in (patch.name for patch, roof in zip(surface.patches, surface.roof, strict=True) if roof):
         material = given[name] if isinstance(given, dict) else given
         t = thicknesses[name] if isinstance(thicknesses, dict) else thicknesses
         model = [material.young * t, (material.weft or material.young) * t]
@@ -326,8 +323,8 @@ def check_names(files: Iterable[PathLike], picture: PathLike | None = None) -> N
             raise FileError(text, what="output")
         suffix = Path(file).suffix.lower()
         if suffix not in io.FORMATS:
-            hint = "; a picture has its own option" if suffix in SUFFIXES else ""
-            text = f"{file}: {unknown('suffix', suffix, io.FORMATS)}{hint}"
+            text = f"{file}: {unknown('suffix', suffix, io.FORMATS)}"
+            text += "; a picture has its own option" * (suffix in SUFFIXES)
             raise FileError(text, what=str(file), found=suffix)
     if picture is not None:
         suffix_of(picture, SUFFIXES, "a picture")
@@ -341,9 +338,8 @@ def check_picture(views: Sequence[Any], colour: str) -> None:
     if colour == "reactions" and len(views) > 1:
         validate.refuse("views", len(views), "one view for a picture of reactions")
     for view in views:
+        angles = view if isinstance(view, Sequence) and len(view) == 2 else [math.nan]
         if isinstance(view, str):
             validate.choice("view", view, tuple(VIEWS))
-        else:
-            angles = view if isinstance(view, Sequence) and len(view) == 2 else [math.nan]
-            if not all(isinstance(angle, int | float) and math.isfinite(angle) for angle in angles):
-                validate.refuse("view", view, "a name or two angles in degrees")
+        elif not all(math.isfinite(validate.real(angle)) for angle in angles):
+            validate.refuse("view", view, "a name or two angles in degrees")

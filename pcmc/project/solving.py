@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ..accuracy import AccuracyStatus, solve_to_accuracy
 from ..base.errors import OptionError
 from ..certificate.diagnosis import VANISHED, vanished_films
+from ..design import DesignStatus, NoStart, Target, meet
+from ..design.targets import measure
 from ..solvers import solve, solve_once
 from ..solvers.neighbours import swap_neighbours
 from ..solvers.result import Progress, Result, Status
@@ -18,9 +21,6 @@ from .checking import in_file
 from .file import Project
 from .outcome import OnStep, Outcome, ignore
 from .settings import AccuracyWanted
-
-if TYPE_CHECKING:
-    from ..design import Target
 
 FLATTER = 2.0  # times the first tensions for heights, where these are too low
 
@@ -105,7 +105,6 @@ def _met_before(targets: Sequence[Target], before: Outcome, after: Outcome) -> l
     where = f"on the new one, {after.surface.m} triangles"
     if after.design is not None:
         return [met if after.good else f"{met}; {where}, {after.design.status.value}"]
-    from ..design.targets import measure  # needed by projects with targets only
 
     reached = ", ".join(f"{target.label} {measure(after.surface, target).value:.6g}" for target in targets)
     return [f"{met}; {where}, the surface does not come to rest with them; it has {reached}"]
@@ -119,7 +118,6 @@ def _solve_or_meet(project: Project, surface: Surface, report: OnStep) -> Outcom
     """
     if not project.targets:
         return _solve(project, surface, report)
-    from ..design import NoStart  # needed by projects with targets only
 
     starts = [surface]
     if project.rises:
@@ -142,13 +140,11 @@ def _solve(project: Project, surface: Surface, report: OnStep) -> Outcome:
 
 
 def _meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
-    from ..design import DesignStatus, meet  # needed by projects with targets only
 
     _newton_alone(project, "meet targets")
-    solves, options = count(1), dict(project.options)
+    solves, tolerance = count(1), project.target_tolerance
+    options = {**project.options} | ({} if tolerance is None else {"tolerance": tolerance})
     options["callback"] = lambda row: report(f"meeting the targets: solve {next(solves)}")
-    if project.target_tolerance is not None:
-        options["tolerance"] = project.target_tolerance
     design = meet(surface, project.targets, project.vary, **options)
     return _certified(design.result, report, design.status is DesignStatus.STOPPED, design=design)
 
@@ -163,24 +159,20 @@ def _certified(result: Result, report: OnStep, stopped: bool, **found: Any) -> O
 
 
 def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
-    """Solve on finer and finer meshes, and certify."""
-    from ..accuracy import AccuracyStatus, solve_to_accuracy
 
     def callback(row: Mapping[str, Any]) -> None:
         report(f"accuracy: {row['triangles']} triangles, error {row['excess']:.2g} of the accuracy wanted")
 
     _newton_alone(project, "reach an accuracy")
     report("solving to the accuracy")
-    wanted = vars(project.wanted) | dict(project.options)
-    accurate = solve_to_accuracy(surface, callback=callback, **wanted)
-    stopped = accurate.status is AccuracyStatus.STOPPED
-    return _certified(accurate.result, report, stopped, accurate=accurate)
+    accurate = solve_to_accuracy(surface, callback=callback, **vars(project.wanted), **project.options)
+    return _certified(accurate.result, report, accurate.status is AccuracyStatus.STOPPED, accurate=accurate)
 
 
 def _newton_alone(project: Project, act: str) -> None:
-    if project.method != "newton":
-        message = f"only method 'newton' can {act}, found {project.method!r}"
-        raise OptionError(message, what="solve.method", found=project.method, expected="newton")
+    if (found := project.method) != "newton":
+        message = f"only method 'newton' can {act}, found {found!r}"
+        raise OptionError(message, what="solve.method", found=found, expected="newton")
 
 
 def reporter(report: OnStep) -> Callable[[Progress], None]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from ..base.arrays import Bools
 from ..base.errors import FileWarning, OptionError, PlanError
 from ..base.files import PathLike
 from ..base.units import NO_UNITS, Units
+from ..design import Parameter, Target
 from ..io import read_bare
 from ..io.mesh_data import MeshData
 from ..surface import Surface
@@ -27,9 +29,6 @@ from .checking import in_file
 from .file import Project, load
 from .outcome import Outcome
 from .settings import BOUNDARY, GROUND, MeshFile
-
-if TYPE_CHECKING:
-    from ..design import Parameter, Target
 
 NEAR = 1e-6  # of the size: vertices this near to a line or to the lowest level are on it
 
@@ -93,19 +92,16 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
         values["tensions"] |= dict.fromkeys(loaded, mesh.tension)
     for name, own in mesh.patches.items():
         patch = surface.patches[surface.patch_index(name)]  # refuses one that is not there
-        for key, value in own.items():
-            if key != "wall":
-                values[f"{key}s"][name] = value
-        if "wall" in own:
-            walled = replace(patch, wall=own["wall"])
-            if own["wall"] and name in data.bare:  # its pressure follows from those beside it
-                walled = replace(walled, pressure=0.0)
+        for key in own.keys() - {"wall"}:
+            values[f"{key}s"][name] = own[key]
+        if "wall" in own:  # without a pressure of its own, which follows from those beside it
+            pressure = 0.0 if own["wall"] and name in data.bare else patch.pressure
+            walled = replace(patch, wall=own["wall"], pressure=pressure)
             patches = changes.get("patches", surface.patches)
             changes["patches"] = [walled if p.name == name else p for p in patches]
     if len(mesh.supports):
         fixed = surface.original[_supported(surface, mesh.supports)]
-        changes |= {"fixed": np.isin(surface.original, fixed)}  # images, too
-        changes |= dict.fromkeys(("on_plane", "on_line"), ())
+        changes |= {"fixed": np.isin(surface.original, fixed), "on_plane": (), "on_line": ()}  # images, too
         changes["on_planes"] = tuple((plane, on) for plane, on in surface.on_planes if plane.mirror)
     if changes:
         surface = surface.rebuilt(**changes)
@@ -115,7 +111,6 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
 
 
 def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
-    """(n,) the vertices that the supports of a project fix."""
     X, boundary = surface.vertices, np.zeros(surface.n, dtype=bool)
     outer = surface.topology.boundary_edge & ~surface.mirror_edge  # at a mirror the roof goes on
     boundary[surface.topology.edges[outer]] = True
@@ -130,26 +125,22 @@ def _supported(surface: Surface, supports: str | Sequence[Any]) -> Bools:
     reach = 0.5 * float(segment_lengths(X, surface.topology.edges).mean())
     fixed = np.zeros(surface.n, dtype=bool)
     for number, one in enumerate(supports, start=1):
-        try:
+        points = np.empty(0)
+        with suppress(TypeError, ValueError):
             points = np.array(one, dtype=float)
-        except (TypeError, ValueError):
-            points = np.empty(0)
         if points.ndim not in (1, 2) or points.shape[-1:] != (3,) or not np.isfinite(points).all():
             validate.refuse("mesh.supports", one, "a point [x, y, z], or a list of points", str(number))
-        line = np.atleast_2d(points)
+        line, away = np.atleast_2d(points), np.full(surface.n, np.inf)
+        for a, b in pairwise(line) if len(line) > 1 else [(line[0], line[0])]:
+            side = b - a
+            part = np.clip((X - a) @ side / max(float(side @ side), 1e-300), 0.0, 1.0)
+            away = np.minimum(away, np.linalg.norm(X - a - part[:, None] * side, axis=1))
+        found = away <= NEAR * surface.size
         if len(line) == 1:
-            away = np.linalg.norm(X - line[0], axis=1)
             found = (away == away.min()) & (away.min() <= reach)
             if NEAR * surface.size < away.min() <= reach:
                 text = f"mesh.supports: number {number} is {away.min():.3g} from the nearest vertex, at"
                 warnings.warn(f"{text} {point_text(X[found][0])}, which is fixed", FileWarning, stacklevel=4)
-        else:
-            away = np.full(surface.n, np.inf)
-            for a, b in pairwise(line):
-                side = b - a
-                part = np.clip((X - a) @ side / max(float(side @ side), 1e-300), 0.0, 1.0)
-                away = np.minimum(away, np.linalg.norm(X - a - part[:, None] * side, axis=1))
-            found = away <= NEAR * surface.size
         if not found.any():
             text = f"mesh.supports: number {number}, {line.tolist()}, has no vertex of the mesh on it"
             raise OptionError(f"{text}; give points in the units of the project", what="mesh.supports")
@@ -162,7 +153,6 @@ def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Targ
 
     The least tension of these caps is p times area over length of the boundary's projection.
     """
-    from ..design import Parameter, Target
 
     if not mesh.rises:
         return surface, [], []
@@ -171,14 +161,13 @@ def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Targ
     held = edges[outer if outer.any() else supported[edges].all(axis=1)]  # the rim of a cushion
     heights = surface.plane.height(surface.vertices[held[supported[held].all(axis=1)]])
     level = float(heights.mean()) if heights.size else 0.0
-    normal = np.array(surface.plane.normal)
     below = sheets_below(surface).values()  # which keep their factor
-    roof = np.array([r and p.name not in below for p, r in zip(surface.patches, surface.roof, strict=True)])
-    roof = roof[surface.patch_of_face]
-    plan = abs(float((area_vectors(surface.vertices[surface.faces[roof]]) @ normal).sum()))
-    least = plan / float(segment_lengths(surface.vertices, held).sum())
     pressed = [p for p, loaded in zip(surface.patches, surface.roof, strict=True) if loaded]
     names, targets, vary = [p.name for p in pressed if p.name not in below], [], []
+    roof = np.array([p.name in names for p in surface.patches])[surface.patch_of_face]
+    vectors = area_vectors(surface.vertices[surface.faces[roof]])
+    plan = abs(float((vectors @ np.array(surface.plane.normal)).sum()))
+    least = plan / float(segment_lengths(surface.vertices, held).sum())
     for rise in mesh.rises:
         if rise.kind == "rise" and heights.size and np.ptp(heights) > NEAR * surface.size:
             text = f"{rise.kind}: the supports are not level, so a rise over them is not defined; give apex"

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..advice.rises import RISES, WHOLE
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Floats, Ints
 from ..base.errors import OptionError
 from ..plan import Plan
 from ..surface import Surface
@@ -37,7 +37,7 @@ def changeable_values(surface: Surface) -> dict[str, dict[str, Any]]:
     rooms of given volume and of walls, snow of walls.
     """
     values, lower = all_values(surface), {*sheets_below(surface).values()}
-    computed = lower | _names(surface, surface.room_signs.any(axis=0) | surface.walls)
+    computed = lower | {p.name for p in surface.patches if p.wall} | _of_rooms(surface)
     points = surface.vertices[single_points(surface)].tolist()
     return {
         **values,
@@ -64,27 +64,20 @@ def differences(surface: Surface, asked: Surface, left: Collection[Name] = ()) -
         text = f"the project makes other parts than the surface has: {', '.join(names[:5])}"
         raise OptionError(text, what="surface", found=names)
     most = {kind: max(abs(theirs[key]) for key in theirs if key[0] == kind) for kind, _ in theirs}
-    return {
-        key: value
-        for key, value in theirs.items()
-        if key not in left and abs(value - ours[key]) > SAME * most[key[0]]
-    }
+    asked_for = ((key, value) for key, value in theirs.items() if key not in left)
+    return {key: value for key, value in asked_for if abs(value - ours[key]) > SAME * most[key[0]]}
 
 
-def _names(surface: Surface, chosen: Bools) -> set[str]:
-    """The names of the patches (k,) chosen."""
-    return {surface.patches[k].name for k in np.flatnonzero(chosen)}
+def _of_rooms(surface: Surface) -> set[str]:
+    """The names of the patches whose pressure keeps a volume."""
+    return {surface.patches[k].name for k in np.flatnonzero(surface.room_signs.any(axis=0))}
 
 
 def _by_name(surface: Surface) -> dict[Name, float]:
     """Every value by kind and name, also the pressures of walls; not the pressures that are results."""
-    computed = _names(surface, np.asarray(surface.room_signs.any(axis=0)))  # of rooms with a volume
-    values = {
-        (kind, name): value
-        for kind, named in all_values(surface).items()
-        for name, value in named.items()
-        if kind != "pressures" or name not in computed
-    }
+    values = {(kind, name): v for kind, own in all_values(surface).items() for name, v in own.items()}
+    for name in _of_rooms(surface):
+        del values["pressures", name]
     for name, place in changeable_values(surface)["points"].items():
         values |= {("points", f"{axis} of {name}"): x for axis, x in zip("xyz", place, strict=True)}
     return values
@@ -126,8 +119,7 @@ def data_with_values(
                     mesh.setdefault("patches", {}).setdefault(name, {})[KEYS[kind]] = _number(value)
                     _drop(mesh, RISES if kind == "tensions" else ())
         else:  # walls that a project leaves open follow its patches, so they come last
-            writer = _Writer(data["plan"], project, start, asked)
-            writer.write(first or missing, shared=len(tried) == 1)
+            _Writer(data["plan"], project, start, asked).write(first or missing, shared=len(tried) == 1)
 
 
 class Source(NamedTuple):
@@ -179,11 +171,8 @@ class _Writer(NamedTuple):
     def write(self, values: Mapping[Name, float], shared: bool) -> None:
         """Write values; if ``shared``, one for all patches where all have the same."""
         walls = {p.name for p in self.asked.patches if p.wall}
-        lines = {
-            key: value
-            for key, value in values.items()
-            if key[0] in ("cables", "cable_weights") or key[1] in walls
-        }
+        kinds = ("cables", "cable_weights")
+        lines = {key: value for key, value in values.items() if key[0] in kinds or key[1] in walls}
         if lines:
             self.write_lines(lines)
         for kind in dict.fromkeys(kind for kind, _ in values):
@@ -199,7 +188,6 @@ class _Writer(NamedTuple):
                 self.write_patches(KEYS[kind], wanted, shared)
 
     def write_points(self, names: Collection[str]) -> None:
-        """Points that hold the roof, in all lines through them."""
         for name in names:
             places = (changeable_values(surface)["points"][name] for surface in (self.start, self.asked))
             old, new = (self.asked.plane.to_local(np.array([place]))[0] for place in places)

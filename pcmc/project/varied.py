@@ -62,13 +62,8 @@ def varied(path: PathLike, values: Mapping[str, float]) -> tuple[Project, Surfac
         what is meant before it: ``cable NAME.tension``, ``hole NAME.x``. Lines without a name are ``divider
         1``, ``wall 1``, ``hole 1``, ``support 1``, …
 
-    Raises
-    ------
-    FileError, PlanError, OptionError
-        As in ``load`` and ``build``; for an unknown name.
+    Errors as in ``load`` and ``build``; OptionError for an unknown name.
 
-    Examples
-    --------
     >>> project, surface = varied("notebooks/roof.toml", {"plan.edge_length": 2, "corner.tension": 9})
     >>> project.plan.edge_length, surface.patches[0].tension
     (2, 9.0)
@@ -86,14 +81,13 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
     start = start_of(project) if project.mesh is not None else None
     project = (start and start.project) or project
     found_by_search: dict[str, str] = {}  # with what each is
+    table = "mesh" if project.plan is None else "plan"
     for parameter in project.vary:
         parts, kind, _ = KINDS[parameter.key]
-        cable, table = parts == "cables", "mesh" if project.plan is None else "plan"
         for one in parameter.names:
-            bare = one.removeprefix(CABLE) if cable else one
+            bare = one.removeprefix(CABLE) if parts == "cables" else one
             names = [f"{bare}.{kind}", f"{CABLE}{bare}.{kind}", f"{table}.patches.{bare}.{kind}"]
-            if project.plan is None or not project.plan.patches:
-                names.append(f"{table}.{kind}")
+            names += [f"{table}.{kind}"] if project.plan is None or not project.plan.patches else []
             found_by_search |= dict.fromkeys(names, parameter.label)
     for name, given in values.items():
         if label := found_by_search.get(name):
@@ -136,34 +130,30 @@ class _Source(NamedTuple):
         data: Any = deepcopy(self.data)
         shifts: dict[str, dict[str, float]] = {}
         for name, value in values.items():
-            stem, _, last = name.rpartition(".")
             if name in self.keys:
+                *steps, key = self.keys[name]
                 table = data
-                for step in self.keys[name][:-1]:
+                for step in steps:
                     table = table.setdefault(step, {}) if isinstance(step, str) else table[step]
-                table[self.keys[name][-1]] = value
+                table[key] = value
             elif not self.is_load(name):
-                shifts.setdefault(stem, {})[last] = value
+                stem, _, axis = name.rpartition(".")
+                shifts.setdefault(stem, {})[axis] = value
         return project_of(self.path, data, self.text, partial(shifted, shifts=shifts))
 
     def loaded(self, surface: Surface, values: Mapping[str, float]) -> Surface:
         """The surface with other tensions and pressures; numbers of the file and shifts are ignored."""
-        known = {
-            f"{CABLE}{cable.name}.{KINDS[kind][1]}": (kind, cable.name)
-            for kind in ("cables", "cable_weights")
-            for cable in surface.cables
-        }
+        known: dict[str, tuple[str, str]] = {}
         for kind, named in reversed(all_values(surface).items()):  # a patch comes after a cable of its name
-            known |= {f"{name}.{KINDS[kind][1]}": (kind, name) for name in named}
+            for prefix in ("", CABLE) if kind in ("cables", "cable_weights") else ("",):
+                known |= {f"{prefix}{name}.{KINDS[kind][1]}": (kind, name) for name in named}
         given: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
         for name in filter(self.is_load, values):
-            if name not in known:
-                # no coordinates, and patches have shorter names
+            if name not in known:  # shows no coordinates but one that is near; patches have shorter names
                 keys = [k for k, at in self.keys.items() if isinstance(at[-1], str) and at[1] != "patches"]
-                near = get_close_matches(name, self.keys, n=1, cutoff=0.8)  # a coordinate, perhaps
+                near = get_close_matches(name, self.keys, n=1, cutoff=0.8)
                 names = tuple(dict.fromkeys([*known, *keys, *near]))
-                text = f"{self.path}: {unknown('number', name, names)}"
-                raise OptionError(text, what=name, expected=names)
+                raise OptionError(f"{self.path}: {unknown('number', name, names)}", what=name, expected=names)
             kind, part = known[name]
             given[kind][part] = values[name]
         with in_file(self.path, OptionError):
@@ -199,7 +189,6 @@ def numbers_by_name(data: Mapping[str, Any]) -> dict[str, KeyPath]:
 
 
 def _items(value: Any, names: tuple[str, ...], path: KeyPath) -> Iterator[Item]:
-    """All that is in a table or list."""
     for key, item in value.items() if isinstance(value, Mapping) else enumerate(value):
         named = item.get("name") if isinstance(item, Mapping) and isinstance(key, int) else None
         own = key if isinstance(key, str) else named if isinstance(named, str) else str(key + 1)
@@ -250,9 +239,8 @@ def _moved(part: Any, by: Floats, plane: Plane) -> Any:
             if plane != Plane():
                 raise OptionError("give it three coordinates, as the plane is not z = 0", what="z")
             points = np.pad(points, ((0, 0), (0, 1)))
-        shifts = np.tile(by[: points.shape[1]], (len(points), 1))
-        shifts[1:] *= not of_arc  # vectors follow an arc's centre
-        return points + shifts
+        shift = by[: points.shape[1]]
+        return np.concatenate([points[:1] + shift, points[1:] + shift * (not of_arc)])  # vectors stay
 
     if not isinstance(part, Curve):
         return moved(np.array([part]))[0].tolist()
@@ -269,9 +257,8 @@ def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) 
     """
     shown = {}
     for name in names if units else ():
-        stem, _, quantity = name.rpartition(".")
-        if quantity == "margin_value":
-            quantity = stem.partition(" of ")[0]
+        stem, _, last = name.rpartition(".")
+        quantity = stem.partition(" of ")[0] if last == "margin_value" else last
         cable = OF_CABLES.get(quantity) if stem in cables or stem.startswith("plan.cables.") else None
         with suppress(OptionError):
             dimension = cable or DIMENSIONS.get(quantity) or dimension_of(quantity)
@@ -281,11 +268,9 @@ def with_units(names: Iterable[str], units: Units, cables: Container[str] = ()) 
 
 def digest(path: PathLike) -> str:
     """SHA-256, hexadecimal, of a project with its drawing, or of the surface that any other file holds."""
-    if is_project(path):
-        text, _ = read_data(Path(path))
-        sha = hashlib.sha256(text.encode())
-        for drawing in files_of(path)[1 if text else 0 :]:
-            sha.update(read_bytes(drawing))
-        return sha.hexdigest()
-    surface = io.read_bare(path)[0]
-    return hashlib.sha256(plain_bytes([getattr(surface, name) for name in FIELDS])).hexdigest()
+    if not is_project(path):
+        surface = io.read_bare(path)[0]
+        return hashlib.sha256(plain_bytes([getattr(surface, name) for name in FIELDS])).hexdigest()
+    text, _ = read_data(Path(path))
+    others = map(read_bytes, files_of(path)[1 if text else 0 :])
+    return hashlib.sha256(b"".join([text.encode(), *others])).hexdigest()

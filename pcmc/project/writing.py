@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 
 from .. import io
-from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, PcmcError
 from ..base.files import PathLike, atomic_writes, check_name, system_error, writing
 from ..base.interrupts import defer_interrupts
@@ -23,6 +22,7 @@ from ..cloth.sheets import pattern_files
 from ..drawings.drawing_set import net_files
 from ..forces.curvature import curvature_error, mean_curvature
 from ..panelling import Panels
+from ..plot import draw, lines, member_forces, panel, reactions, under_load
 from ..structure import Analysis, StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from .checking import in_file
@@ -72,8 +72,7 @@ def project_files(project: Project, outcome: Outcome, anyway: bool, progress: On
         if output.report is not None:
             listed = dict.fromkeys((path.name for path in project.inputs), "drawing or mesh of the roof")
             listed |= {project.path.name: "project"} | {path.name: what for what, (path, _) in made}
-            report = outcome.report(output, files=listed, anyway=anyway)
-            add("report", [(Path(output.report), report.write)])
+            add("report", [(Path(output.report), outcome.report(output, files=listed, anyway=anyway).write)])
     return [job for _, job in made]
 
 
@@ -84,9 +83,10 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
     members of the project.
     """
     paths = [*map(Path, files)]
-    members = members_filed(outcome) if any(map(_holds_members, paths)) else {}
+    holding = {path: io.FORMATS[path.suffix.lower()].members for path in paths}
+    members = members_filed(outcome) if any(holding.values()) else {}
     for held in (True, False):
-        if some := [path.name for path in paths if _holds_members(path) == held]:
+        if some := [path.name for path in paths if holding[path] == held]:
             warn_of_members(outcome, ", ".join(some), held)
     if outcome.result is not None:
         return certified_files(*outcome.shown, paths, outcome.units, colour, members, outcome.mark)
@@ -97,14 +97,8 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
         place = {half.m: unfold.face, half.n: unfold.vertex}
         carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
         about |= {"scalars": carried, "certificate": None}
-    writes = {path: partial(io.write, surface=outcome.shown.surface, **about) for path in paths}
-    return [
-        (path, partial(write, **members) if _holds_members(path) else write) for path, write in writes.items()
-    ]
-
-
-def _holds_members(path: Path) -> bool:
-    return io.FORMATS[path.suffix.lower()].members
+    write = partial(io.write, surface=outcome.shown.surface, **about)
+    return [(path, partial(write, **members) if holding[path] else write) for path in paths]
 
 
 def certified_files(
@@ -119,11 +113,8 @@ def certified_files(
     """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
     relative curvature error, size of the reactions at supports (force), and ``members_filed``; with the
     ``mark`` where the certificate has none."""
-    scalars: dict[str, Floats] = {
-        "mean curvature": mean_curvature(surface),
-        "error": curvature_error(surface),
-        "reaction": np.linalg.norm(certificate.reactions, axis=1),
-    }
+    scalars = {"mean curvature": mean_curvature(surface), "error": curvature_error(surface)}
+    scalars["reaction"] = np.linalg.norm(certificate.reactions, axis=1)
     jobs: FileJobs = []
     for file in map(Path, files):
         form = io.FORMATS[file.suffix.lower()]
@@ -166,14 +157,11 @@ def schedule_jobs(path: Path, schedule: Panels) -> FileJobs:
 
 def cost_jobs(path: Path, costs: pd.DataFrame) -> FileJobs:
     """The table and the picture of ``FewerFamilies.costs``, with the functions that write them."""
-    from ..plot import lines  # needs the extra plot
 
-    best = costs[costs["cheapest"]]
-    curves = {"surfaces on the way": costs, "the cheapest": best}
+    curves = {"surfaces on the way": costs, "the cheapest": costs[costs["cheapest"]]}
     pairs = {name: (one["change"], one["cost"]) for name, one in curves.items()}
-    look: dict[str, Any] = {"x": "change of shape, length", "y": "cost", "markers": True}
-    draw = partial(lines, pairs, **look)
-    return list(zip(cost_paths(path), (partial(costs.to_csv, index=False), draw), strict=True))
+    picture = partial(lines, pairs, x="change of shape, length", y="cost", markers=True)
+    return list(zip(cost_paths(path), (partial(costs.to_csv, index=False), picture), strict=True))
 
 
 def model_job(outcome: Outcome, path: Path, model: StructuralModel) -> FileJob:
@@ -183,14 +171,11 @@ def model_job(outcome: Outcome, path: Path, model: StructuralModel) -> FileJob:
 
 def analysis_jobs(outcome: Outcome, path: Path, analysis: Analysis) -> FileJobs:
     """The tables and pictures of an analysis beside the structural model."""
-    from ..plot import member_forces, under_load  # needs the extra plot
 
     pictures: dict[str, Any] = {"cases": under_load}
     pictures |= {"member-forces": member_forces} if analysis.model.beams else {}
-    tables = {f"{name}.csv": partial(table.to_csv, index=False) for name, table in analysis.tables.items()}
-    jobs = tables | {
-        f"{name}.png": partial(draw, analysis, mark=outcome.mark) for name, draw in pictures.items()
-    }
+    jobs = {f"{name}.csv": partial(table.to_csv, index=False) for name, table in analysis.tables.items()}
+    jobs |= {f"{name}.png": partial(draw, analysis, mark=outcome.mark) for name, draw in pictures.items()}
     return [(path.with_name(f"{path.stem}-{name}"), write) for name, write in jobs.items()]
 
 
@@ -209,8 +194,6 @@ def draw_picture(
     mark: str = "",
 ) -> None:
     """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
-    # needs the extra plot, which a project without a picture does not
-    from ..plot import draw, panel, reactions
 
     check_picture(views, colour)
     if colour == "reactions":
@@ -236,14 +219,12 @@ def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: It
         raise FileError(f"{made} is a file; the output needs a folder", what=str(made))
     for path in paths:
         check_name(path)
-        place = os.path.normcase(path.resolve())
-        folder = path.parent
+        place, folder, problem = os.path.normcase(path.resolve()), path.parent, None
         try:
             is_folder = path.is_dir()
             there = next(f for f in (folder.absolute(), *folder.absolute().parents) if f.exists())
         except OSError as error:  # a name that is too long
             raise system_error(path, "written", error) from None
-        problem = None
         if is_folder:
             problem = "is a folder; give the name of a file"
         elif path.exists() and any(path.samefile(one) for one in read):

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from ..base.units import Units
+from ..cloth import CuttingPattern
+from ..cloth.sheets import seam_sheet
 from ..drawings.sheet import column
 from ..plot import member_forces, strains, under_load
 from ..plot.figure import png
+from ..structure import Analysis, StructuralModel
 from ..structure.columns import column_answers, columns_at_rest
 from ..structure.member_forces import member_tables, members_at_rest, sentences
 from .plan import FORMAT, on_paper
 from .tables import Block, Columns, Heading, Picture, columns_in, one, text_table, vectors_of
 from .words import sentence
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from ..cloth import CuttingPattern
-    from ..structure import Analysis
-    from ..structure.model import StructuralModel
 
 PIXELS = 1300  # width of a picture
 ABOUT = (
@@ -37,7 +34,6 @@ SIGNS = (
     "the factor on the forces along a member at which it buckles alone, without the sheets that hold it."
 )
 
-AT_REST = "These are the forces under the form-finding load alone; no load cases were run."
 
 ABOUT_COLUMNS = (
     "They follow from the forces of the supports by statics; N is above 0 in tension. A stay that would be "
@@ -66,19 +62,18 @@ def under_load_chapter(analysis: Analysis, units: Units) -> Iterator[Block]:
     yield from map(sentence, analysis.answers(units))
     for what in ("deflection", "least force"):
         yield Picture("", png(under_load(analysis, what=what, units=units, width=PIXELS)))
-    table, kinds = analysis.patches, {"least_force mean_force largest_force": units.tension}
-    columns = columns_in(table, kinds | {"slack_area": units.area})
-    yield text_table("Membrane forces by patch", table[["case", "patch"]], columns)
+    kinds = {"least_force mean_force largest_force": units.tension, "slack_area": units.area}
+    columns = columns_in(analysis.patches, kinds)
+    yield text_table("Membrane forces by patch", analysis.patches[["case", "patch"]], columns)
     table = analysis.supports.rename(columns={"support": "", "name": "of"})
     columns = {f"length, {units.length}": column(table["length"].where(table["length"] > 0.0))}
     columns |= vectors_of(table, "force", "F", force)
     yield text_table("Forces of the supports on the roof", table[["case", "", "of", "kind"]], columns)
-    table = analysis.cables
-    if len(table):
+    if len(table := analysis.cables):
         columns = columns_in(table, {"least largest": force})
         yield text_table("Forces of cables", table[["case", "cable"]], columns)
-    pictures = [member_forces(analysis, units=units, width=PIXELS)] if len(analysis.members) else []
-    yield from _members(analysis.model, analysis.members, units, *map(png, pictures))
+    pictures = [png(member_forces(analysis, units=units, width=PIXELS))] if len(analysis.members) else []
+    yield from _members(analysis.model, analysis.members, units, *pictures)
     yield from _columns(analysis.model, analysis.columns, units)
 
 
@@ -87,31 +82,28 @@ def at_rest_chapter(model: StructuralModel, units: Units) -> Iterator[Block]:
     rest = model.steps[0].name, members_at_rest(model)
     if model.beams or model.bars:
         yield Heading("Members at rest", new_page=True)
-        yield AT_REST
+        yield "These are the forces under the form-finding load alone; no load cases were run."
     yield from _members(model, member_tables([rest])[0], units)
     yield from _columns(model, columns_at_rest(model), units)
 
 
 def _columns(model: StructuralModel, table: pd.DataFrame, units: Units) -> Iterator[Block]:
-    """The forces of columns and stays, and what they leave to others."""
     if not len(table):
         return
     profiles = {bar.name: bar.member.profile for bar in model.bars}
     sections = {name: p.label if p.shape else f"A = {p.area:.4g}" for name, p in profiles.items()}
     words: Columns = dict(table[["case", "member", "kind"]])
-    words[f"section, {units.length}"] = [sections[name] for name in table["member"]]
+    words[f"section, {units.length}"] = table["member"].map(sections)
     kinds = {"length": units.length, "N euler": units.force or "force", "stress": units.pressure}
     columns = columns_in(table, kinds)
-    for key, title in (("utilisation", "of its strength, %"), ("euler_over", "Euler over thrust")):
-        values = table[key] * (100.0 if key == "utilisation" else 1.0)
-        columns[title] = ["" if math.isnan(v) else f"{v:.3g}" for v in values]
+    shares = {"of its strength, %": 100.0 * table["utilisation"], "Euler over thrust": table["euler_over"]}
+    columns |= {title: ["" if math.isnan(v) else f"{v:.3g}" for v in own] for title, own in shares.items()}
     yield text_table("Forces of columns and stays", words, columns)
     yield ABOUT_COLUMNS
     yield from map(sentence, column_answers(model, table, units))
 
 
 def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *pictures: bytes) -> Iterator[Block]:
-    """What the members are, the forces along them, and what they carry at rest."""
     if not len(table):
         return
     force, length, beams = units.force or "force", units.length, model.beams
@@ -126,8 +118,7 @@ def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *picture
         columns[f"I {where}, {length}⁴"] = [f"{profile.moments[k]:.4g}" for profile in profiles]
     columns[f"E, {units.pressure}"] = [f"{line.member.material.young:.4g}" for line in beams]
     yield text_table("Members", words, columns)
-    kinds = {"least_N largest_N V": force, "M": f"{force}·{length}", "moved": length}
-    columns = columns_in(table, kinds)
+    columns = columns_in(table, {"least_N largest_N V": force, "M": f"{force}·{length}", "moved": length})
     columns["span over it"] = [f"{over:.3g}" if over < 1e3 else f"{over:.0f}" for over in table["span_over"]]
     columns["buckling"] = ["" if math.isnan(factor) else f"{factor:.4g}" for factor in table["buckling"]]
     yield text_table("Forces of members", table[["case", "member"]], columns)
@@ -138,7 +129,6 @@ def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *picture
 
 def cutting_chapter(pattern: CuttingPattern, units: Units) -> Iterator[Block]:
     """What is cut in sentences, the strips on the roof from above and coloured by strain, and their table."""
-    from ..cloth.sheets import seam_sheet
 
     table, sewn = pattern.table, pattern.seam_table.query("kind != 'rim'")
     sheet = seam_sheet(pattern, FORMAT, units.length)

@@ -7,34 +7,32 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
+from ..accuracy import Margin, MeshCheck
 from ..base.files import atomic_write, suffix_of, writing
 from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate, quantities
 from ..certificate.certificate import certified
 from ..certificate.quantities import Figure
+from ..certificate.theorem import Theorem
+from ..cloth import CuttingPattern
 from ..drawings.sheet import MISSED, register_fonts
 from ..panelling import Panels, panels
 from ..plot import draw, families, reactions
 from ..plot.figure import png
+from ..structure import Analysis, StructuralModel
 from ..surface import Surface, expect_surface
 from ..surface.images import expect_no_images
 from . import tables
 from .chapters import PIXELS, at_rest_chapter, cutting_chapter, under_load_chapter
 from .plan import PaperPlan, paper_plan
 from .tables import Block, Heading, Picture, Table
-from .words import ERROR_BARS, LEGEND, Statement, about_forces, panel_text, sentence, verdict_sentences
+from .words import ERROR_BARS, LEGEND, about_forces, panel_text, sentence, verdict_sentences
 
 SUFFIXES = (".pdf",)
-
-if TYPE_CHECKING:
-    from ..accuracy import MeshCheck
-    from ..cloth import CuttingPattern
-    from ..structure import Analysis, StructuralModel
-
 VERSIONS = ("numpy", "scipy", "reportlab", "matplotlib")
 
 
@@ -52,9 +50,9 @@ class RoofReport:
     date: str = ""  # in their foot
     mesh_check: MeshCheck | None = None
     mesh_failure: str = ""
-    theorem: Statement | None = None
+    theorem: Theorem | None = None
     targets: pd.DataFrame | None = None
-    margins: Sequence[Statement] = ()
+    margins: Sequence[Margin] = ()
     analysis: Analysis | None = None
     model: StructuralModel | None = None
     pattern: CuttingPattern | None = None
@@ -66,39 +64,34 @@ class RoofReport:
         FileError for another suffix than .pdf, or a file that cannot be written.
         """
         suffix_of(path, SUFFIXES, "a report")
-        path = Path(path)
         content = self.pdf()
         with writing(path), atomic_write(path) as temporary:
             temporary.write_bytes(content)
-        return path
+        return Path(path)
 
     def pdf(self) -> bytes:
         """The bytes of the PDF file."""
         from .pages import pdf  # needs reportlab
 
         title = f"Report on the roof {self.name}" if self.name else "Report on a roof"
-        mark = self.certificate.mark
-        if not mark and self.targets is not None and not self.targets["met"].all():
-            mark = MISSED
+        missed = self.targets is not None and not self.targets["met"].all()
         foot = ", ".join(filter(None, (f"pcmc {version('pcmc-surfaces')}", self.date)))
-        return pdf(list(self._blocks()), title, foot, mark)
+        return pdf(list(self._blocks()), title, foot, self.certificate.mark or MISSED * missed)
 
     def _blocks(self) -> Iterator[Block]:
-        """All that the pages hold, in order."""
         surface, certificate, units = self.surface, self.certificate, self.units
         yield Heading("Verdict")
         yield from verdict_sentences(certificate, self.mesh_check, self.theorem, units)
         yield from (f"The roof {margin.text(units)}." for margin in self.margins)
         yield tables.key_figures(surface, self.figures, units)
-        roof = draw(surface, view="diagonal", legend=True, width=PIXELS)
-        yield Picture("View from above", png(roof))
+        yield Picture("View from above", png(draw(surface, view="diagonal", legend=True, width=PIXELS)))
         yield Heading(f"Plan, scale {self.plan.scale}, lengths in {units.length}", new_page=True)
         yield self.plan
         yield LEGEND
         yield Picture("Elevation", png(draw(surface, view="elevation", width=PIXELS)))
         if len(certificate.supports):
-            acting = reactions(surface, units=units, width=PIXELS)
-            yield Picture("Reactions of the supports on the roof", png(acting))
+            acting = png(reactions(surface, units=units, width=PIXELS))
+            yield Picture("Reactions of the supports on the roof", acting)
         yield Heading("Forces")
         yield about_forces(units)
         if self.targets is not None:
@@ -106,13 +99,13 @@ class RoofReport:
         yield tables.table_of_patches(surface, certificate, units)
         yield from tables.line_tables(certificate, units)
         yield from tables.cable_tables(certificate, units)
-        if self.mesh_check is not None:
-            parts = (self.mesh_check.verdict.value, self.mesh_check.detail, self.mesh_check.advice)
+        if self.mesh_check is not None or self.mesh_failure:
             yield Heading("Mesh check")
-            yield f"{sentence('; '.join(filter(None, parts)))} {ERROR_BARS}"
-            yield tables.mesh_table(self.mesh_check, units)
+        if (check := self.mesh_check) is not None:
+            parts = filter(None, (check.verdict.value, check.detail, check.advice))
+            yield f"{sentence('; '.join(parts))} {ERROR_BARS}"
+            yield tables.mesh_table(check, units)
         elif self.mesh_failure:
-            yield Heading("Mesh check")
             yield f"The mesh could not be checked: {self.mesh_failure}."
         if self.analysis is not None:
             yield from under_load_chapter(self.analysis, units)
@@ -154,8 +147,8 @@ def roof_report(
     about : ``name`` of the roof; ``date`` as it is to be printed, no clock is read; ``mesh_check`` of the
         surface, for error bars, or ``mesh_failure``, why it failed; ``theorem`` of the surface; ``targets``
         of a ``Design``; ``margins``, a sentence each; ``analysis`` under load, of ``pcmc.analyse``, or the
-        structural ``model``, for the forces of its members at rest;
-        ``pattern``, of ``pcmc.cutting_pattern``; ``files``, the name of each file and what it is.
+        structural ``model``, for the forces of its members at rest; ``pattern``, of ``pcmc.cutting_pattern``;
+        ``files``, the name of each file and what it is.
 
     Raises
     ------

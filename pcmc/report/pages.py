@@ -83,15 +83,13 @@ def _draw_frame(canvas: Any, title: str, foot: str, mark: str, number: str) -> N
 
 
 def _cut(text: str, width: float) -> str:
-    """The text, shortened to a width in points."""
-    shown = text
-    while shown and stringWidth(shown + "…", FONT, 8.0) > width:
-        shown = shown[:-1]
-    return text if shown == text else shown + "…"
+    end = len(text)
+    while end and stringWidth(text[:end] + "…", FONT, 8.0) > width:
+        end -= 1
+    return text[:end] + "…" * (end < len(text))
 
 
 def _flowables(block: Block) -> list[Any]:
-    """What reportlab lays out for a block."""
     if isinstance(block, Heading):
         return [*([PageBreak()] if block.new_page else []), _paragraph(block.text, HEADING)]
     if isinstance(block, str):
@@ -101,21 +99,18 @@ def _flowables(block: Block) -> list[Any]:
     title = [_paragraph(block.title, TITLE)] if block.title else []
     if isinstance(block, Table):
         headed = bool(block.head)
-        size, rows = CELL, [block.head, *block.rows] if headed else block.rows
+        rows = [block.head, *block.rows] if headed else block.rows
+        size = max(5.0, CELL * min(1.0, WIDTH / sum(_widths(rows, CELL))))
         widths = _widths(rows, size)
-        if sum(widths) > WIDTH:
-            size = max(5.0, size * WIDTH / sum(widths))
-            widths = _widths(rows, size)
         cells = []
         for k, row in enumerate(rows):
             styles = [_style(BOLD if headed and not k else FONT, size, right) for right in (False, headed)]
             cells.append([_paragraph(text, styles[j >= block.words]) for j, text in enumerate(row)])
         everywhere = (0, 0), (-1, -1)
         look = [("VALIGN", *everywhere, "TOP"), ("LINEBELOW", *everywhere, 0.25, HexColor("#D8D8D8"))]
-        look += [(f"{side}PADDING", *everywhere, 2.0) for side in ("TOP", "BOTTOM")]
-        look += [(f"{side}PADDING", *everywhere, 3.0) for side in ("LEFT", "RIGHT")]
-        if headed:
-            look.append(("LINEBELOW", (0, 0), (-1, 0), 0.6, HexColor(INK)))
+        paddings = {"TOP": 2.0, "BOTTOM": 2.0, "LEFT": 3.0, "RIGHT": 3.0}
+        look += [(f"{side}PADDING", *everywhere, padding) for side, padding in paddings.items()]
+        look += [("LINEBELOW", (0, 0), (-1, 0), 0.6, HexColor(INK))] * headed
         widths = [width * min(WIDTH / sum(widths), 1.0) for width in widths]
         place = {"hAlign": "LEFT", "spaceBefore": 4.0, "spaceAfter": 8.0}
         return [*title, Grid(cells, colWidths=widths, repeatRows=int(headed), style=look, **place)]

@@ -40,25 +40,22 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
     view = views.plan_view(surface, views.model_curves(surface), ())
     decimals = length_decimals(units.length, surface.size)
     sheet = views.placed([view], "Plan", FORMAT, length_factor(units.length, "mm"), None, decimals)
-    panels = [line for line in sheet.lines if line.layer == "PCMC-PANEL"]
-    edges = [float(np.linalg.norm(line.points[1] - line.points[0])) for line in panels]
-    drop = bool(edges) and float(np.mean(edges)) < LEAST_EDGE
+    panels = [line.points[1] - line.points[0] for line in sheet.lines if line.layer == "PCMC-PANEL"]
+    drop = bool(panels) and float(np.linalg.norm(panels, axis=1).mean()) < LEAST_EDGE
     lines = [line for line in sheet.lines if not (drop and line.layer == "PCMC-PANEL")]
     marks, texts = sheet.drawn()
     lines += marks[len(sheet.lines) :]
     ((factor, shift),) = sheet.places
     supports, own = certificate.supports[["x", "y"]].to_numpy(), support_vertices(certificate.acting).items()
-    labels = [(name, at, on, "PCMC-SUPPORT") for (name, on), at in zip(own, supports, strict=True)]
+    labels = []
     if len(certificate.junctions):
         middles = certificate.junctions[["middle_x", "middle_y"]].to_numpy()
         curves = zip(certificate.acting.standing.topology.junctions, middles, strict=True)
-        ridges = [(f"J{k}", at, curve.vertices, "PCMC-RIDGE") for k, (curve, at) in enumerate(curves, 1)]
-        labels = ridges + labels
-    names = [
-        Text(factor * _beside(surface, at, on) + shift, name, layer=layer, align="C")
-        for name, at, on, layer in labels
-    ]
-    texts += place_labels(names, texts)
+        labels = [(f"J{k}", at, curve.vertices, "PCMC-RIDGE") for k, (curve, at) in enumerate(curves, 1)]
+    labels += [(name, at, on, "PCMC-SUPPORT") for (name, on), at in zip(own, supports, strict=True)]
+    places = [factor * _beside(surface, at, on) + shift for _, at, on, _ in labels]
+    named = zip(labels, places, strict=True)
+    texts += place_labels([Text(at, name, layer=layer, align="C") for (name, *_, layer), at in named], texts)
     return on_paper(sheet.scale, lines, texts)
 
 
@@ -75,9 +72,5 @@ def on_paper(scale: str, lines: Sequence[SheetLine], texts: Sequence[Text]) -> P
     boxes = np.array([*(box(text) for text in texts), *([p.min(axis=0), p.max(axis=0)] for p, *_ in lines)])
     corner, top = boxes[:, 0].min(axis=0) - AROUND, boxes[:, 1].max(axis=0) + AROUND
     width, height = map(float, top - corner)
-    return PaperPlan(
-        scale,
-        [line._replace(points=line.points - corner) for line in lines],
-        [text._replace(at=text.at - corner) for text in texts],
-        (width, height),
-    )
+    lines = [line._replace(points=line.points - corner) for line in lines]
+    return PaperPlan(scale, lines, [text._replace(at=text.at - corner) for text in texts], (width, height))

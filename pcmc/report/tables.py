@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from ..accuracy import MeshCheck
 from ..base.units import Units
 from ..certificate import Certificate
 from ..certificate.quantities import Figure, dimension_of
@@ -16,9 +17,6 @@ from ..drawings.sheet import column
 from ..panelling import Panels
 from ..surface import Surface
 from .plan import PaperPlan
-
-if TYPE_CHECKING:
-    from ..accuracy import MeshCheck
 
 MIDDLE = "middle_x middle_y middle_z"
 MOST_FAMILIES = 40  # rows of the panel schedule; the table of panels has all of them
@@ -48,8 +46,7 @@ class Table(NamedTuple):
 
 
 Columns = dict[str, Iterable[Any]]
-Block = str | Heading | Picture | Table | PaperPlan
-"""What the pages of a report are made of; a text alone is a paragraph."""
+Block = str | Heading | Picture | Table | PaperPlan  # of the pages of a report; a text is a paragraph
 
 
 def one(value: float) -> str:
@@ -57,7 +54,7 @@ def one(value: float) -> str:
     return column([value])[0]
 
 
-LISTED = {
+LISTED = {  # the key figures of a report; those of several walls are added
     ("apex", "roof"): "highest point above the plane",
     ("area", "roof"): "area of the roof",
     ("area", "wall"): "area of walls",
@@ -66,7 +63,6 @@ LISTED = {
     ("reaction", "roof"): "all reactions, upwards",
     ("reaction per length", "roof"): "largest reaction per length",
 }
-"""The key figures of a report; those of several walls are added."""
 
 
 def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Table:
@@ -74,9 +70,8 @@ def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Ta
     width, depth, _ = np.ptp(surface.vertices, axis=0).tolist()
     rows = [["size in the plan", f"{one(width)} × {one(depth)} {units.length}"]]
     for (quantity, owner), label in LISTED.items():
-        found = [f.value for f in figures if (f.quantity, f.owner) == (quantity, owner)]
-        values = [value for value in found if value is not None]
-        if values:
+        found = (f.value for f in figures if (f.quantity, f.owner) == (quantity, owner))
+        if values := [value for value in found if value is not None]:
             rows.append([label, f"{one(sum(values))} {units.behind(dimension_of(quantity)).strip()}"])
     rows.append(["mesh", f"{surface.m} triangles, {surface.n} vertices"])
     return Table("Key figures", [], rows)
@@ -84,8 +79,7 @@ def key_figures(surface: Surface, figures: Sequence[Figure], units: Units) -> Ta
 
 def table_of_patches(surface: Surface, certificate: Certificate, units: Units) -> Table:
     """A row per patch: tension, pressure, snow, weight, area, mean curvature and its error."""
-    heads = {"net": "net_pressure", "mean_H": "mean_curvature"}
-    table = certificate.patches.rename(columns=heads)
+    table = certificate.patches.rename(columns={"net": "net_pressure", "mean_H": "mean_curvature"})
     pressures = " ".join(key for key in ("pressure", "snow", "net_pressure") if key in table)
     kinds = {"tension": units.tension, pressures: units.pressure, "area": units.area}
     columns = columns_in(table, kinds | {"mean_curvature": f"1/{units.length}"})
@@ -98,19 +92,17 @@ def table_of_patches(surface: Surface, certificate: Certificate, units: Units) -
 
 def line_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
     """Junctions and supports with their reactions, numbered as in the plan, and how far walls lean."""
-    table, force = certificate.junctions, units.force or "force"
-    if len(table):
+    force = units.force or "force"
+    if len(table := certificate.junctions):
         columns = columns_in(table, {f"length {MIDDLE}": units.length})
         columns[f"force left, {units.tension}"] = map(small, table["force_left"])
         numbers = [f"J{k + 1}" for k in range(len(table))]
         yield text_table("Junctions", {"": numbers, "between": table["junction"]}, columns)
-    table = certificate.leaning
-    if len(table):
-        leans: Columns = {"lean, °": [f"{lean:.1f}" for lean in table["lean"]]}
-        columns = leans | columns_in(table, {"x y z": units.length})
+    if len(table := certificate.leaning):
+        columns = {"lean, °": [f"{lean:.1f}" for lean in table["lean"]]}
+        columns |= columns_in(table, {"x y z": units.length})
         yield text_table("Walls: the largest angle from the vertical", table[["wall"]], columns)
-    table = certificate.supports
-    if len(table):
+    if len(table := certificate.supports):
         own = table["name"].where(table["name"] != table["support"], "")
         columns = columns_in(table, {"x y z": units.length})
         columns[f"length, {units.length}"] = column(table["length"].where(table["length"] > 0.0))
@@ -130,39 +122,29 @@ def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
         weights = {"weight": units.tension} if "weight" in table else {}
         columns = columns_in(table, {"force": force, **weights, f"length {MIDDLE}": units.length})
         yield text_table("Cables", table[["cable"]], columns)
-    table = certificate.cable_ends
-    if len(table):
-        ends = ["held" if held else "free" for held in table["held"]]
+    if len(table := certificate.cable_ends):
+        words = {"cable": table["cable"], "end": ["held" if held else "free" for held in table["held"]]}
         columns = columns_in(table, {"x y z": units.length}) | vectors_of(table, "force", "F", force)
-        words = {"cable": table["cable"], "end": ends}
         yield text_table("Ends of cables, and the forces on them", words, columns)
-    table = certificate.rooms
-    if len(table):
+    if len(table := certificate.rooms):
         columns = columns_in(table, {"volume prescribed": units.volume, "pressure": units.pressure})
         yield text_table("Rooms of prescribed volume", table[["room"]], columns)
 
 
 def target_table(targets: pd.DataFrame, units: Units) -> Table:
     """What was wanted, and what is reached."""
-    columns: Columns = {
-        "wanted": map(one, targets["wanted"]),
-        "reached": map(one, targets["value"]),
-        "unit": [units.behind(dimension).strip() for dimension in targets["dimension"]],
-        "met": ["yes" if met else "no" for met in targets["met"]],
-    }
+    columns: Columns = {"wanted": map(one, targets["wanted"]), "reached": map(one, targets["value"])}
+    columns["unit"] = [units.behind(dimension).strip() for dimension in targets["dimension"]]
+    columns["met"] = ["yes" if met else "no" for met in targets["met"]]
     return text_table("Targets", {"quantity": targets.index}, columns)
 
 
 def mesh_table(check: MeshCheck, units: Units) -> Table:
     """Each quantity with its error bar, and its limit on finer and finer meshes."""
     table = check.table
-    columns: Columns = {
-        "on this mesh": map(one, table["value"]),
-        "error bar": map(_bar, table["error"]),
-        "limit": map(one, table["limit"]),
-        "its error bar": map(_bar, table["limit_error"]),
-        "unit": [units.behind(dimension_of(quantity)).strip() for quantity in table["quantity"]],
-    }
+    columns: Columns = {"on this mesh": map(one, table["value"]), "error bar": map(_bar, table["error"])}
+    columns |= {"limit": map(one, table["limit"]), "its error bar": map(_bar, table["limit_error"])}
+    columns["unit"] = [units.behind(dimension_of(quantity)).strip() for quantity in table["quantity"]]
     return text_table("", {"quantity": table["quantity"], "of": table["of"]}, columns)
 
 
@@ -200,12 +182,9 @@ def columns_in(table: pd.DataFrame, units: Mapping[str, str]) -> Columns:
 
 def small(value: float) -> str:
     """The size of an error."""
-    if not math.isfinite(value):
-        return "–"
-    return f"{value:.0e}" if value else "0"
+    return (f"{value:.0e}" if value else "0") if math.isfinite(value) else "–"
 
 
 def _bar(value: float) -> str:
     """An error bar, to two digits; nothing for one without bound, and "given" where the value is given."""
-    text = f"± {column([value], 2)[0]}" if math.isfinite(value) else "–"
-    return text if value else "given"
+    return (f"± {column([value], 2)[0]}" if math.isfinite(value) else "–") if value else "given"

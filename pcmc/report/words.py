@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
-
+from ..accuracy import MeshCheck
 from ..base.units import NO_UNITS, Units
 from ..certificate import Certificate, Verdict
 from ..certificate.supports import balance_sentence
+from ..certificate.theorem import Theorem
 from ..panelling import Panels
 from .tables import MOST_FAMILIES, one, small
 
-if TYPE_CHECKING:
-    from ..accuracy import MeshCheck
-
-
-class Statement(Protocol):
-    """A statement about a roof in one sentence, such as a theorem or a margin."""
-
-    def text(self, units: Units) -> str:
-        """The sentence."""
-
-
-VERDICTS = {
+VERDICTS = {  # what each verdict means for those who build
     Verdict.STABLE: "The roof is in equilibrium, and the equilibrium is stable: tension and pressure balance"
     " everywhere, and after any small disturbance the roof returns to this shape.",
     Verdict.NEUTRAL: "The roof is in equilibrium, but some change of shape needs almost no force. Hold the"
@@ -36,21 +25,19 @@ VERDICTS = {
     Verdict.WALL_DOWN: "A ridge comes down on the bottom of its wall, where it cannot rest.",
     Verdict.DEGENERATE: "Triangles of the mesh have collapsed: the shape says nothing about a roof.",
 }
-"""What each verdict means for those who build."""
 
-LEGEND = (
+LEGEND = (  # of the plan
     "J1, J2 and so on number the junctions, B1, B2 and so on the supports along lines, S1, S2 and so on those"
     " at points, C1, C2 and so on the ends of cables on lines, as in the tables. Black: rims. Red: ridges."
     " Green: bottoms and ends of walls. Violet: cables. Grey: edges of panels, and mirrors."
 )
-"""How to read the plan."""
 ERROR_BARS = "An error bar estimates how far the limit on finer and finer meshes may be from the number."
 
 
 def verdict_sentences(
     certificate: Certificate,
     check: MeshCheck | None = None,
-    theorem: Statement | None = None,
+    theorem: Theorem | None = None,
     units: Units = NO_UNITS,
 ) -> list[str]:
     """The verdict, its reason, and how exactly the roof keeps what it promises.
@@ -79,16 +66,12 @@ def verdict_sentences(
         sentences.append(f"The mesh check: {check.verdict.value.partition(': ')[2]}.")
     if theorem is not None:
         sentences.append(sentence(theorem.text(units)))
-    if certificate.symmetric_in:
-        planes = ", ".join(certificate.symmetric_in)
-        sentences.append(
-            f"This is the piece of the roof between its mirror planes ({planes}); the verdict is about"
-            " changes of shape that are symmetric in them."
-        )
+    if planes := ", ".join(certificate.symmetric_in):
+        text = f"This is the piece of the roof between its mirror planes ({planes}); the verdict is about"
+        sentences.append(f"{text} changes of shape that are symmetric in them.")
     if certificate.cuts_itself:
         sentences.append(f"It cannot be built as it is: {certificate.cuts_itself}.")
-    if len(certificate.pinched):
-        count = len(certificate.pinched)
+    if count := len(certificate.pinched):
         sentences.append(f"The ridge rests on the plane at {count} {'vertex' if count == 1 else 'vertices'}.")
     return sentences
 
@@ -101,22 +84,21 @@ def sentence(text: str) -> str:
 def about_forces(units: Units) -> str:
     """How the signs and units of the tables are meant."""
     force = units.force or "the unit of force of the tensions"
-    return (
+    text = (
         f"Lengths are in {units.length}, forces in {force}. Reactions are the forces of the supports on the"
-        " roof: z is up, so a negative z holds the roof down."
     )
+    return f"{text} roof: z is up, so a negative z holds the roof down."
 
 
 def panel_text(schedule: Panels, units: Units) -> str:
     """How many panels and families there are, how large, and how they meet."""
     total, angles = schedule.edge_totals, schedule.edges["dihedral"].dropna()
+    largest, smallest = (one(float(panel["area"])) for panel in (schedule.largest, schedule.smallest))
     text = (
         f"{len(schedule.panels)} flat triangles in {schedule.count} families. Panels of a family differ"
-        f" by at most {schedule.tolerance:g} {units.length} in the length of each edge."
-        f" Together they have an area of {one(schedule.area)} {units.area}, and edges of"
-        f" {one(float(total['length'].sum()))} {units.length}."
-        f" The largest has {one(float(schedule.largest['area']))} {units.area}, the smallest"
-        f" {one(float(schedule.smallest['area']))} {units.area}."
+        f" by at most {schedule.tolerance:g} {units.length} in the length of each edge. Together they have an"
+        f" area of {one(schedule.area)} {units.area}, and edges of {one(float(total['length'].sum()))}"
+        f" {units.length}. The largest has {largest} {units.area}, the smallest {smallest} {units.area}."
     )
     if len(angles):
         text += f" The angle between neighbours is from {angles.min():.1f}° to {angles.max():.1f}°."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from ..base.arrays import Bools, Floats
 from ..base.compiled import blocks, compiled, threads
 from ..base.tolerances import FORCE_ROUNDING
 from ..forces import triangles
+from ..forces.elements import energy_mesh
 from ..forces.functional import add_forces, elements, total
 from ..forces.motion_space import force_scale
 from ..surface import Surface
@@ -67,12 +68,16 @@ class Evaluator:
     def __init__(self, surface: Surface, tolerance: float | None = None, inflation: float = np.inf) -> None:
         self.count, self._tolerance = 0, converged_below(surface, tolerance)
         self._largest = inflation * surface.size
-        self._mesh = triangles.energy_mesh(surface)
+        self._mesh = energy_mesh(surface)
         self._supports = surface.fixed, surface.on_plane, np.array(surface.plane.normal)
         self._others = tuple((plane, mask) for plane, mask in surface.sliding if mask is not surface.on_plane)
         self._surface = surface
-        self._more = surface.heavy or any(True for _ in elements(surface, surface.vertices))
-        self._single = len(blocks(surface.m, threads())) == 1 and not self._mesh.curved
+        self._more = any(True for _ in elements(surface, surface.vertices))
+        self._single = len(blocks(surface.m, threads())) == 1 and not (self._mesh.curved or surface.heavy)
+
+    def row(self, point: Point) -> dict[str, Any]:
+        """The point as a row of a solver's history."""
+        return {"evaluation": self.count, "energy": point.energy, "gradient_squared": point.squared}
 
     def ending(self, point: Point) -> Status | None:
         """Why to stop at a point, or None."""
@@ -85,18 +90,17 @@ class Evaluator:
     def __call__(self, X: Floats) -> Point:
         """E, ∇E and ‖∇E‖² with the vertices at X (n,3); not finite rather than an error."""
         self.count += 1
-        tension, pressure = self._mesh.tension, self._mesh.pressure
-        if self._single:  # the same sums as triangles.measure, without its overhead for threads
-            (area, volume), G = np.zeros((2, len(tension))), np.zeros(X.shape)
-            triangles.measure_block(self._mesh, X, 0, len(self._mesh.faces), area, volume, G)
+        if self._single:  # the same sums as ``totals_and_gradient``, without its overhead for threads
+            sums, G = np.zeros((3, len(self._mesh.tension))), np.zeros(X.shape)
+            triangles.measure_block(self._mesh, X, 0, len(self._mesh.faces), sums[0], sums[1], G)
         else:
-            area, volume, G = triangles.totals_and_gradient(self._mesh, X)
+            sums, G = triangles.totals_and_gradient(self._mesh, X)
         further = add_forces(self._surface, X, G) if self._more else 0.0
         for plane, mask in self._others:
             G[mask] = plane.along(G[mask])
         squared = _apply_supports(G, *self._supports)
         with np.errstate(all="ignore"):
-            return Point(X, total(tension, area, pressure, volume) + further, G, squared)
+            return Point(X, total(self._mesh, sums) + further, G, squared)
 
 
 @compiled

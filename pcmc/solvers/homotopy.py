@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, NamedTuple
@@ -12,6 +12,7 @@ import numpy as np
 from ..base.arrays import Bools, Floats
 from ..base.errors import NoBranch
 from ..base.tolerances import HOMOTOPY_END, SOUND
+from ..certificate.balance import hardly_balanced, load_name, load_ratio
 from ..certificate.diagnosis import held_groups
 from ..certificate.proof import Attempt
 from ..forces.functional import gradient
@@ -19,6 +20,7 @@ from ..surface import Surface
 from . import solve_once
 from .continuation import BoundaryMotion, Branch, Direction, Ending, follow
 from .result import Callback, Progress, Result, Status
+from .starts import low_start
 
 BACK = 0.03  # of the farthest value: how far behind a turn a way down may open, and the branch is followed
 MIN_QUALITY = 0.3  # of triangles along a branch, below which vertices are redistributed
@@ -55,16 +57,6 @@ class Homotopy:
     steps: int = 80
     smallest: float = 1e-4
     back: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class HomotopyOutcome:
-    """A surface to solve from and how it was reached, or how the attempt ended; ``way`` as in Attempt."""
-
-    way: str
-    surface: Surface | None = None
-    note: str = ""
-    attempt: Attempt | None = None
 
 
 @dataclass(eq=False)
@@ -125,16 +117,11 @@ class Solves:
                 interrupted.append(error)
                 raise
 
+        steps = min(homotopy.steps, self.options.get("iterations", homotopy.steps))
+        how: dict[str, Any] = {"min_quality": MIN_QUALITY, "steps": steps, "smallest": homotopy.smallest}
+        watch = until_turned(count, homotopy.back)
         try:
-            branch = follow(
-                surface,
-                parameter,
-                1.0 / homotopy.unit,
-                callback=until_turned(count, homotopy.back),
-                min_quality=MIN_QUALITY,
-                steps=min(homotopy.steps, self.options.get("iterations", homotopy.steps)),
-                smallest=homotopy.smallest,
-            )
+            branch = follow(surface, parameter, 1.0 / homotopy.unit, callback=watch, **how)
         except NoBranch:
             return None
         if interrupted:  # by the callback, whatever it raised
@@ -147,29 +134,28 @@ class Solves:
             self.callback(Progress(row["iteration"], surface, row))
 
 
-def attempt(homotopy: Homotopy, solves: Solves) -> HomotopyOutcome:
-    """Follow a homotopy to the surface asked for, if the branch arrives there."""
+def attempt(homotopy: Homotopy, solves: Solves) -> tuple[Surface, str] | Attempt:
+    """Follow a homotopy to the surface asked for: a surface to solve from and a note, or how it ended."""
     way = homotopy.way
     for start in homotopy.starts:
         result = solves.solve(start.surface, **homotopy.options)
         if result.converged:
             break
     else:
-        return HomotopyOutcome(way, attempt=Attempt(way, "no start"))
+        return Attempt(way, "no start")
     note = homotopy.note.format(share=start.share)
     if start.parameter is None:
-        return HomotopyOutcome(way, result.surface, note)
+        return result.surface, note
     branch = solves.follow(result.surface, start.parameter, homotopy)
     if branch is None:
-        return HomotopyOutcome(way, attempt=Attempt(way, "no start"))
+        return Attempt(way, "no start")
     end = classify_end(branch, homotopy.back)
     if end.kind == "reached":
-        return HomotopyOutcome(way, homotopy.asked.moved(branch.last.vertices), note)
+        return homotopy.asked.moved(branch.last.vertices), note
     rates = start.parameter.tensions if isinstance(start.parameter, Direction) else {}
     at = tuple((p.name, p.tension + end.farthest * rates.get(p.name, 0.0)) for p in start.surface.patches)
     tensions = tuple((name, tension) for name, tension in at if tension > 0.0) if rates else ()
-    value = end.farthest * homotopy.unit
-    return HomotopyOutcome(way, attempt=Attempt(way, end.kind, value, start.share, tensions))
+    return Attempt(way, end.kind, end.farthest * homotopy.unit, start.share, tensions)
 
 
 class BranchEnd(NamedTuple):
@@ -219,15 +205,33 @@ def classify_end(branch: Branch, back: float | None = None) -> BranchEnd:
     return BranchEnd("fold" if folded else "lost", farthest, quality)
 
 
-def raise_loads(low: Surface, load: str, ratio: float) -> Homotopy:
+def further_ways(start: Surface, pinchable: Bools) -> Iterator[Surface | Homotopy]:
+    """The low start, and the homotopies that apply in the order of their cost."""
+    low = low_start(start)
+    if low is None:
+        return
+    pressed = low.net_pressures.any()
+    loaded = pressed or low.weights.any()
+    if low.rooms or loaded:
+        yield low
+    if low.rooms:  # their pressures are not given, and no homotopy begins at others
+        return
+    if loaded:
+        yield raise_loads(low)
+    if pressed and not hardly_balanced(start, pinchable):
+        yield from filter(None, [relax_tensions(low)])
+    yield from filter(None, [continue_in_distance(start, low)])
+
+
+def raise_loads(low: Surface) -> Homotopy:
     """All net pressures and weights grow in proportion, from the highest of a few loads with a minimum.
 
-    What grows is p - s, so the snow comes with the pressure; it has a name ``load`` and a ``load_ratio``.
+    What grows is p - s, so the snow comes with the pressure.
     """
     none = {patch.name: 0.0 for patch in low.patches}
     pressures = {patch.name: patch.net_pressure for patch in low.patches if patch.net_pressure != 0.0}
     weights = {patch.name: patch.weight for patch in low.patches if patch.weight != 0.0}
-    carried = min(1.0, 1.0 / max(ratio, 1e-300))
+    load, carried = load_name(low), min(1.0, 1.0 / max(load_ratio(low), 1e-300))
     # λ is the load over what the boundary carries, so that a fold is near 1 however weak the patches
     direction = Direction(
         pressures={name: carried * p for name, p in pressures.items()},
@@ -243,15 +247,14 @@ def raise_loads(low: Surface, load: str, ratio: float) -> Homotopy:
     return Homotopy(load, f"by raising the {load} from {{share:.3g}} of it", low, starts, carried)
 
 
-def relax_tensions(low: Surface, strongest: float, ratio: float) -> Homotopy | None:
-    """From equal tensions of all patches under pressure to those asked for; None for one such patch alone.
-
-    ``ratio`` is the ``load_ratio`` with the ``strongest`` tension for all of them.
-    """
+def relax_tensions(low: Surface) -> Homotopy | None:
+    """From equal tensions of all patches under pressure to those asked for; None for one such patch alone."""
     asked = {patch.name: patch.tension for patch in low.patches if patch.tension > 0.0}
-    pressed = [patch.name for patch in low.patches if not patch.auxiliary]
+    pressed = {patch.name: patch.tension for patch in low.patches if not patch.auxiliary}
     if len(pressed) < 2:
         return None
+    strongest = max(pressed.values())
+    ratio = load_ratio(low.retensioned(dict.fromkeys(pressed, strongest)))
     needed = strongest * max(1.0, STRONGER * ratio)
 
     def start(raised: float, most: float) -> HomotopyStart:
@@ -267,65 +270,42 @@ def relax_tensions(low: Surface, strongest: float, ratio: float) -> Homotopy | N
 
 
 def continue_in_distance(surface: Surface, low: Surface) -> Homotopy | None:
-    """The distance between the held curves grows to the surface's; None where they cannot be moved."""
-    scaling = BoundaryScaling.of(surface)
-    if scaling is None:
+    """The distances between the held curves grow in proportion to the surface's, along one line.
+
+    It is the line along which their middles lie most apart, or that across Π where the surface slides there.
+    None without two curves to be moved apart, or where the end of a junction or cable slides along one. The
+    other vertices that slide so are held meanwhile, which changes no shape.
+    """
+    for _, mask in surface.on_line:
+        if (mask & surface.topology.on_junction).any() or mask[surface.cable_edges.ends].any():
+            return None
+    slides = surface.on_line and not surface.on_planes
+    clamped = surface.rebuilt(fixed=surface.fixed, on_line=()) if slides else surface
+    groups, lengths = held_groups(clamped)
+    fixed = np.isfinite(lengths)
+    X, plane = clamped.vertices, clamped.plane
+    held = (groups >= 0) & clamped.fixed
+    if len(lengths) < 2 or not fixed.any() or (clamped.fixed & ~held).any() or clamped.on_planes:
         return None
-    shapes = surface.vertices, low.vertices
-    starts = (
-        HomotopyStart(scaling.at(share, shape), BoundaryMotion(scaling.boundary, start=share), share)
-        for share, shape in product(DISTANCES, shapes)
-    )
+    centres = np.array([X[groups == number].mean(axis=0) for number in range(len(lengths))])
+    if clamped.on_plane.any():
+        line, middle = np.array(plane.normal), np.array(plane.point)
+        apart = np.where(fixed, (centres - middle) @ line, 0.0)
+    else:
+        middle = centres.mean(axis=0)
+        line = np.linalg.svd(centres - middle)[2][0]
+        apart = (centres - middle) @ line
+    if np.ptp(apart) < FLAT * clamped.size:
+        return None
+    along = apart[groups[held]]  # how far the curve of each held vertex is from ``middle``, which stays
+
+    def boundary(share: float) -> Floats:
+        return np.asarray(X[held] + ((share - 1.0) * along)[:, None] * line)
+
+    def start(share: float, shape: Floats) -> HomotopyStart:
+        places = shape + ((share - 1.0) * ((shape - middle) @ line))[:, None] * line
+        places[held] = boundary(share)
+        return HomotopyStart(clamped.moved(places), BoundaryMotion(boundary, start=share), share)
+
+    starts = (start(share, shape) for share, shape in product(DISTANCES, (surface.vertices, low.vertices)))
     return Homotopy("distance", "by moving the held curves apart", surface, starts)
-
-
-@dataclass(frozen=True, eq=False)
-class BoundaryScaling:
-    """A surface whose held curves can be moved along one line, the distances between them in proportion."""
-
-    surface: Surface  # at the full distance
-    line: Floats  # (3,) unit vector along which the middles of the curves lie most apart
-    middle: Floats  # (3,) a point that stays
-    along: Floats  # (n,) how far each held vertex's curve is from it
-    held: Bools  # (n,) the vertices that move with their curves
-
-    @classmethod
-    def of(cls, surface: Surface) -> BoundaryScaling | None:
-        """The line through the middles of the fixed curves; that across Π where the surface slides there.
-
-        None without two curves to be moved apart, or where the end of a junction or cable slides along one.
-        The other vertices that slide so are held meanwhile, which changes no shape.
-        """
-        for _, along in surface.on_line:
-            if (along & surface.topology.on_junction).any() or along[surface.cable_edges.ends].any():
-                return None
-        if surface.on_line and not surface.on_planes:
-            surface = surface.rebuilt(fixed=surface.fixed, on_line=())
-        groups, lengths = held_groups(surface)
-        fixed = np.isfinite(lengths)
-        X, plane = surface.vertices, surface.plane
-        held = (groups >= 0) & surface.fixed
-        if len(lengths) < 2 or not fixed.any() or (surface.fixed & ~held).any() or surface.on_planes:
-            return None
-        centres = np.array([X[groups == number].mean(axis=0) for number in range(len(lengths))])
-        if surface.on_plane.any():
-            line, middle = np.array(plane.normal), np.array(plane.point)
-            apart = np.where(fixed, (centres - middle) @ line, 0.0)
-        else:
-            middle = centres.mean(axis=0)
-            line = np.linalg.svd(centres - middle)[2][0]
-            apart = (centres - middle) @ line
-        if np.ptp(apart) < FLAT * surface.size:
-            return None
-        return cls(surface, line, middle, np.where(held, apart[groups], 0.0), held)
-
-    def boundary(self, share: float) -> Floats:
-        """(k,3) the fixed vertices with their curves at a share of the distance."""
-        X = self.surface.vertices + ((share - 1.0) * self.along)[:, None] * self.line
-        return X[self.held]
-
-    def at(self, share: float, shape: Floats) -> Surface:
-        """The surface at a share of the distance; its free vertices are those of a shape (n,3), nearer."""
-        X = shape + ((share - 1.0) * ((shape - self.middle) @ self.line))[:, None] * self.line
-        X[self.held] = self.boundary(share)
-        return self.surface.moved(X)

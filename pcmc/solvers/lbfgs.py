@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import frexp, ldexp
 from typing import Any
 
 import nlopt
@@ -17,7 +16,6 @@ from ..surface import Surface
 from .evaluate import Evaluator, Point
 from .result import Callback, Progress, Result, Status, until_stopped
 
-COLUMNS = ("evaluation", "energy", "gradient_squared")
 ORDINARY = 20  # powers of two from 1: NLopt's fixed numbers do no harm within
 SAME_ENERGY = 1e-13  # of the energy: two energies closer than this are equal in floats
 
@@ -72,8 +70,8 @@ class Coordinates:
         ]
         stiffness = np.sqrt(surface.tensions.max() or 1.0)
         self.unit = 0.5 / stiffness
-        exponent = frexp(surface.size * stiffness)[1]
-        self.scale = ldexp(1.0, exponent) if abs(exponent) > ORDINARY else 1.0
+        exponent = math.frexp(surface.size * stiffness)[1]
+        self.scale = math.ldexp(1.0, exponent) if abs(exponent) > ORDINARY else 1.0
         self.count = 3 * len(self.free) + 2 * sum(len(vertices) for vertices, _ in self.sliding)
 
     def positions(self, s: Floats) -> Floats:
@@ -102,7 +100,7 @@ class Objective:
         self.surface, self.options, self.callback = surface, options, callback
         self.coordinates = Coordinates(surface)
         self.evaluate = Evaluator(surface, options.tolerance, options.inflation)
-        self.rows: list[tuple[Any, ...]] = []  # of ``COLUMNS``
+        self.rows: list[dict[str, Any]] = []  # of the history
         self.best: Point | None = None  # of least energy; the converged one if there is one
         self.status: Status | None = None  # why the last point ends the run
         self.raised: BaseException | None = None  # by the callback, until NLopt has returned
@@ -127,7 +125,7 @@ class Objective:
         point = self.evaluate(X)
         self.status = self.evaluate.ending(point)
         if point.finite or not self.rows:
-            self.rows.append((self.evaluate.count, point.energy, point.squared))
+            self.rows.append(self.evaluate.row(point))
             best = self.best or point  # the one of less energy, or of the same to rounding and less force
             other = abs(point.energy - best.energy) > SAME_ENERGY * abs(best.energy)
             better = point.energy < best.energy if other else point.squared < best.squared
@@ -135,9 +133,30 @@ class Objective:
         if self.status is None and self.evaluate.count >= self.options.evaluations:
             self.status = Status.ITERATION_LIMIT  # NLopt's own limit waits for a step
         if self.callback is not None and point.finite:
-            named = dict(zip(COLUMNS, self.rows[-1], strict=True))
-            self.callback(Progress(len(self.rows), lambda: self.surface.moved(X), named))
+            self.callback(Progress(len(self.rows), lambda: self.surface.moved(X), self.rows[-1]))
         return point
+
+    def minimize(self) -> Status:
+        """Run NLopt; why it stopped."""
+        if self.coordinates.count == 0:
+            return Status.CONVERGED
+        optimizer = nlopt.opt(nlopt.LD_LBFGS, self.coordinates.count)
+        optimizer.set_min_objective(self)
+        optimizer.set_vector_storage(self.options.memory)
+        self.halt = optimizer.force_stop
+        try:
+            optimizer.optimize(np.zeros(self.coordinates.count))
+        except Exception:  # NLopt's exceptions have no common base and no message: use its result code
+            if self.status is self.raised is None and optimizer.last_optimize_result() > 0:
+                raise
+        finally:
+            # NLopt holds a reference to the objective that the garbage collector does not see:
+            # remove the objective's references to NLopt and to the exception's frames
+            self.halt = lambda: None
+            raised, self.raised = self.raised, None
+        if raised is not None:
+            raise raised
+        return self.status or Status.STALLED
 
 
 def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callback | None = None) -> Result:
@@ -155,41 +174,10 @@ def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callb
     'lbfgs: converged: the residual is below its tolerance'
     """
     objective = Objective(surface, options or LbfgsOptions(), callback)
-    status = until_stopped(lambda: _optimize(objective))
-    best, rows = objective.best, objective.rows
-    if best is None or rows[-1][1:] != (best.energy, best.squared):
-        best = objective.evaluate(surface.vertices if best is None else best.X)
-        rows.append((objective.evaluate.count, best.energy, best.squared))
-    return Result(
-        surface=surface.moved(best.X),
-        status=objective.status or status,
-        method="lbfgs",
-        energy=best.energy,
-        iterations=len(rows),
-        evaluations=objective.evaluate.count,
-        rows=[dict(zip(COLUMNS, row, strict=True)) for row in rows],
-    )
-
-
-def _optimize(objective: Objective) -> Status:
-    """Minimise the objective with NLopt; why it stopped."""
-    unknowns = objective.coordinates.count
-    if unknowns == 0:
-        return Status.CONVERGED
-    optimizer = nlopt.opt(nlopt.LD_LBFGS, unknowns)
-    optimizer.set_min_objective(objective)
-    optimizer.set_vector_storage(objective.options.memory)
-    objective.halt = optimizer.force_stop
-    try:
-        optimizer.optimize(np.zeros(unknowns))
-    except Exception:  # NLopt's exceptions have no common base and no message: use its result code
-        if objective.status is objective.raised is None and optimizer.last_optimize_result() > 0:
-            raise
-    finally:
-        # NLopt holds a reference to the objective that the garbage collector does not see:
-        # remove the objective's references to NLopt and to the exception's frames
-        objective.halt = lambda: None
-        raised, objective.raised = objective.raised, None
-    if raised is not None:
-        raise raised
-    return objective.status or Status.STALLED
+    status = until_stopped(objective.minimize)
+    evaluate, best, rows = objective.evaluate, objective.best, objective.rows
+    if best is None or (rows[-1]["energy"], rows[-1]["gradient_squared"]) != (best.energy, best.squared):
+        best = evaluate(surface.vertices if best is None else best.X)
+        rows.append(evaluate.row(best))
+    surface, status = surface.moved(best.X), objective.status or status
+    return Result(surface, status, "lbfgs", best.energy, len(rows), evaluate.count, rows)

@@ -10,8 +10,7 @@ from ..base import validate
 from ..base.errors import SurfaceError
 from ..certificate.diagnosis import vanished_films
 from ..forces.rooms import energy_at_volumes
-from ..meshing.films import film_of
-from ..meshing.neighbour_swap import swap
+from ..meshing.neighbour_swap import film_of, swap
 from ..surface import Surface, expect_surface
 from ..surface.parts import listed
 from . import solve

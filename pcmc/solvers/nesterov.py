@@ -112,10 +112,8 @@ def nesterov(
     rows: list[dict[str, Any]] = []
 
     def add_row(of: Move) -> None:
-        names = "iteration", "evaluation", "energy", "gradient_squared", "t", "armijo_held"
-        point = of.point
-        values = of.iteration, evaluate.count, point.energy, point.squared, of.t, of.passed
-        rows.append(dict(zip(names, values, strict=True)))
+        search = {"t": of.t, "armijo_held": of.passed}
+        rows.append({"iteration": of.iteration, **evaluate.row(of.point), **search})
 
     def run() -> Status:
         nonlocal move
@@ -133,16 +131,9 @@ def nesterov(
 
     add_row(move)
     status = until_stopped(run)
-    return Result(
-        surface=surface.moved(move.point.X),
-        status=evaluate.ending(move.point) or status,
-        method="nesterov",
-        energy=move.point.energy,
-        iterations=move.iteration,
-        evaluations=evaluate.count,
-        # Ctrl-C may come between a row and its move; the history ends with the surface returned
-        rows=rows[: move.iteration + 1],
-    )
+    end, status = surface.moved(move.point.X), evaluate.ending(move.point) or status
+    del rows[move.iteration + 1 :]  # Ctrl-C may come between a row and its move
+    return Result(end, status, "nesterov", move.point.energy, move.iteration, evaluate.count, rows)
 
 
 def _iterate(move: Move, evaluate: Evaluator, options: NesterovOptions) -> Move:
@@ -156,11 +147,8 @@ def _iterate(move: Move, evaluate: Evaluator, options: NesterovOptions) -> Move:
         with np.errstate(all="ignore"):  # an overflow becomes a status, not a warning
             d = drift - t * ahead.gradient
             new = evaluate(move.point.X + d)
-        if options.armijo == "printed":
-            bound = ahead.energy + options.xi * t * new.squared
-        else:
-            bound = ahead.energy - options.xi * t * ahead.squared
-        passed = new.energy <= bound
+        margin = new.squared if options.armijo == "printed" else -ahead.squared
+        passed = new.energy <= ahead.energy + options.xi * t * margin
         if passed or not options.line_search:
             break
     return Move(move.iteration + 1, new, d, t, passed)

@@ -61,19 +61,11 @@ def newton(
         except CurvedContactError as error:
             why = str(error).removeprefix("order: ").removesuffix("; give order=1")
             end.note = f"its triangles are flat, though order={order} was asked for: {why}"
-    reached = end.state.result_surface()
-    return Result(
-        surface=reached,
-        status=end.status,
-        method="newton",
-        energy=energy(reached) if reached.rooms else end.state.energy,
-        iterations=len(end.rows) - 1,
-        evaluations=log.evaluations,
-        rows=end.rows,
-        note=end.note,
-        clear=[end.clear] if end.clear is not None else [],
-        room_changes=tuple((room_pressures(reached) - room_pressures(first)).tolist()),
-    )
+    reached, work = end.state.result_surface(), (len(end.rows) - 1, log.evaluations, end.rows)
+    changes = tuple((room_pressures(reached) - room_pressures(first)).tolist())
+    value = energy(reached) if reached.rooms else end.state.energy
+    clear = [end.clear] if end.clear else []
+    return Result(reached, end.status, "newton", value, *work, end.note, room_changes=changes, clear=clear)
 
 
 def _with_volumes(surface: Surface) -> Surface:
@@ -95,11 +87,8 @@ def _solve_level(
 ) -> NewtonRun:
     """Solve on one mesh; where a junction comes down on a held bottom, once more so that it can rest."""
     end = _attempts(NewtonRun(surface, options, log, level, rows))
-    if end.status not in LOST:
-        return end
-    if not held_wall_down(end.state.result_surface(), end.state.walls.pinchable):
-        return end
-    if not find_walls(surface, held=True).held.any():
+    lost = end.status in LOST and held_wall_down(end.state.result_surface(), end.state.walls.pinchable)
+    if not (lost and find_walls(surface, held=True).held.any()):
         return end
     again = _attempts(NewtonRun(surface, options, log, level, end.rows, held=True))
     return again if again.status in (Status.CONVERGED, Status.SADDLE, Status.STOPPED) else end
@@ -165,15 +154,11 @@ def _rests(end: NewtonRun, must_slip: bool) -> bool:
 def _refuse_loose_parts(surface: Surface) -> None:
     """Refuse a part with an open edge and no support: nothing stops it from moving away."""
     topo = surface.topology
-    open_parts = topo.components[topo.edges[topo.boundary_edge, 0]]
-    loose = np.setdiff1d(open_parts, topo.components[surface.held])
+    loose = np.setdiff1d(topo.components[topo.edges[topo.boundary_edge, 0]], topo.components[surface.held])
     if len(loose):
         vertex = int(np.flatnonzero(topo.components == loose[0])[0])
         face = int(np.flatnonzero((surface.faces == vertex).any(axis=1))[0])
         name = surface.patches[surface.patch_of_face[face]].name
-        raise SurfaceError(
-            f"the part of the surface around vertex {vertex} (patch {name!r}) has an open boundary"
-            " and no support; hold it with fixed= or on_plane=, or remove it",
-            what=name,
-            where=vertex,
-        )
+        text = f"the part of the surface around vertex {vertex} (patch {name!r}) has an open boundary and no"
+        text += " support; hold it with fixed= or on_plane=, or remove it"
+        raise SurfaceError(text, what=name, where=vertex)

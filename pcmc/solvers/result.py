@@ -93,7 +93,6 @@ class Result:
     clear: list[SecondVariation] = field(default_factory=list)
 
     def __repr__(self) -> str:
-        """How the solver ended, the verdict if the certificate was asked for, and the surface reached."""
         known = [self.certificate.verdict.value] if "certificate" in vars(self) else []
         energy = f"E = {self.energy:.10g}, {self.iterations} iterations"
         return "\n".join([self.message, *known, energy, repr(self.surface)])
@@ -113,17 +112,13 @@ class Result:
         # imported here, as they take long to import; so does pandas below
         from ..certificate import Evidence, certify
 
-        first = Status[self.tried[0].end.upper()] if self.tried else self.status  # before the search
-        evidence = {
-            Status.DIVERGED: Evidence.INFLATED,
-            Status.VANISHED: Evidence.VANISHED,
-            Status.DEGENERATE: Evidence.COLLAPSED,
-        }.get(first)
+        names = {"diverged": "INFLATED", "vanished": "VANISHED", "degenerate": "COLLAPSED"}
+        first = self.tried[0].end if self.tried else self.status.name.lower()  # before the search
         return certify(
             self.surface,
             modes=modes,
             tolerance=tolerance,
-            evidence=evidence,
+            evidence=Evidence[names[first]] if first in names else None,
             tried=self.tried,
             whole=whole,
             clear=self.clear.pop() if self.clear else None,

@@ -2,31 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from ..base.arrays import Bools
 from ..base.tolerances import AT_REST
-from ..certificate.balance import growing_part, hardly_balanced, load_name, load_ratio, overload
+from ..certificate.balance import growing_part, overload
 from ..certificate.diagnosis import pinched_neck
 from ..certificate.proof import Attempt
 from ..certificate.verdict import theorems
 from ..forces.pinching import standing_part
 from ..forces.rooms import room_volumes
 from ..surface import Surface
-from .homotopy import (
-    Homotopy,
-    HomotopyOutcome,
-    LimitReached,
-    Solves,
-    attempt,
-    continue_in_distance,
-    raise_loads,
-    relax_tensions,
-)
+from .homotopy import Homotopy, LimitReached, Solves, attempt, further_ways
 from .result import Callback, Result, Status
-from .starts import low_start
 
 FAR = 10.0  # times a volume
 FAILED = (Status.DIVERGED, Status.DEGENERATE, Status.STALLED, Status.ITERATION_LIMIT, Status.VANISHED)
@@ -61,26 +50,26 @@ def _search(start: Surface, first: Result, solves: Solves) -> Result:
     proofs = theorems(start, pinchable)
     growing = growing_part(start) if minimum and not proofs else ""
     tried, given = [Attempt("given start", _name(first))], _name(first).replace("_", " ")
-    ways = _further_ways(start, pinchable) if not (growing or proofs) else ()
+    ways = further_ways(start, pinchable) if not (growing or proofs) else ()
     if growing:
         result = solves.solve(start, target="stationary")
         if result.converged:
             return replace(result, status=Status.SADDLE, note=growing)
         tried.append(Attempt("stationary point", _name(result)))
     for way in ways:
-        outcome = attempt(way, solves) if isinstance(way, Homotopy) else way
-        if outcome.surface is not None:
-            result = solves.solve(outcome.surface)
+        end = attempt(way, solves) if isinstance(way, Homotopy) else (way, "from a lower start")
+        if not isinstance(end, Attempt):
+            result = solves.solve(end[0])
             if result.converged:
-                note = f"found {outcome.note}, as the given start led to none ({given})"
+                note = f"found {end[1]}, as the given start led to none ({given})"
                 return replace(result, note="; ".join(filter(None, (note, result.note))))
-        tried.append(outcome.attempt or Attempt(outcome.way, _name(result)))
-        if tried[-1].folds:
+            end = Attempt(way.way if isinstance(way, Homotopy) else "low start", _name(result))
+        tried.append(end)
+        if end.folds:
             break
-    proofs = (*filter(None, [load]), *proofs)
     neck = pinched_neck(first.surface) if first.status is Status.DEGENERATE else None
-    if first.rows[-1]["residual"] <= AT_REST:  # a coarse mesh may rest where no smooth surface does
-        proofs = ()
+    coarse = first.rows[-1]["residual"] <= AT_REST  # a coarse mesh may rest where no smooth surface does
+    proofs = () if coarse else (*filter(None, [load]), *proofs)
     status, folds = first.status, [attempt for attempt in tried if attempt.folds]
     if proofs:
         status = Status.NO_EQUILIBRIUM
@@ -100,28 +89,6 @@ def _far_volume(start: Surface) -> str:
             text = f"room {room.name!r} is to have {room.volume:.4g} and has {volume:.4g} at the start:"
             return f"{text} go there in steps of 3 times the volume or so, each from the surface before"
     return ""
-
-
-def _further_ways(start: Surface, pinchable: Bools) -> Iterator[HomotopyOutcome | Homotopy]:
-    """The low start, and the homotopies that apply in the order of their cost."""
-    low = low_start(start)
-    if low is None:
-        return
-    pressed = low.net_pressures.any()
-    loaded = pressed or low.weights.any()
-    if low.rooms or loaded:
-        yield HomotopyOutcome("low start", low, "from a lower start")
-    if low.rooms:  # their pressures are not given, and no homotopy begins at others
-        return
-    most = max((patch.tension for patch in low.patches if not patch.auxiliary), default=0.0)
-    equal = low.retensioned({patch.name: most for patch in low.patches if not patch.auxiliary})
-    what, ratio, ratio_of_equal = load_name(low), load_ratio(low), load_ratio(equal)
-    balanced = not hardly_balanced(start, pinchable)
-    if loaded:
-        yield raise_loads(low, what, ratio)
-    if pressed and balanced:
-        yield from filter(None, [relax_tensions(low, most, ratio_of_equal)])
-    yield from filter(None, [continue_in_distance(start, low)])
 
 
 def _name(result: Result) -> str:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_array, triu
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats
 from ..base.tolerances import PARALLEL
 from ..forces.motion_space import MotionSpace, VertexClasses, perpendicular
 from ..forces.pattern import Pattern, hessian_pattern
@@ -47,7 +47,12 @@ class Smoother:
         used = np.bincount(surface.topology.faces.ravel(), minlength=surface.n) > 0
         self._surface, self._axes = surface, _axes(surface)
         self._parts = np.where(used, surface.topology.components, -1)
-        self._free, self._number = _free_coordinates(surface, used, self._axes)
+        planes = ((surface.plane, surface.on_plane | surface.given_supports.on_plane), *surface.on_planes)
+        masks = []  # (n,) by axis, the vertices that are free along it
+        for axis in self._axes:
+            across = [on for plane, on in planes if np.linalg.norm(np.cross(axis, plane.normal)) <= PARALLEL]
+            masks.append(used & ~np.logical_or.reduce([surface.pinned, *across]))
+        self._free, self._number = np.unique(masks, axis=0, return_inverse=True)
         self._spaces = [_one_unknown_each(free) for free in self._free]
         self._patterns = [hessian_pattern(self._classes, space) for space in self._spaces]
         self._factorisers = [factoriser(pattern, backend) for pattern in self._patterns]
@@ -57,8 +62,7 @@ class Smoother:
         """Compute L_α at the positions X (n,3) and factorise it."""
         self._factors = []
         for space, pattern, solver in zip(self._spaces, self._patterns, self._factorisers, strict=True):
-            data = _laplacian(self._moderated, self._classes, space, pattern, X)
-            self._factors.append(solver.factor(data))
+            self._factors.append(solver.factor(_laplacian(self._moderated, self._classes, space, pattern, X)))
 
     def solve(self, forces: Floats) -> Floats:
         """L_α⁻¹ forces (n,3), zero where a support holds the coordinate.
@@ -90,23 +94,6 @@ def _axes(surface: Surface) -> Floats:
             return np.stack([first, np.cross(normal, first), normal])
     first, second = perpendicular(normal[None])
     return np.stack([first[0], second[0], normal])
-
-
-def _free_coordinates(surface: Surface, used: Bools, axes: Floats) -> tuple[list[Bools], Ints]:
-    """The masks (n,) of the vertices that are free along some axis, and (3,) which of them each axis has."""
-    held = surface.pinned
-    on_plane = surface.on_plane | surface.given_supports.on_plane
-    planes = ((surface.plane, on_plane), *surface.on_planes)
-    masks = []
-    for axis in axes:
-        stopped = held.copy()
-        for plane, mask in planes:
-            if np.linalg.norm(np.cross(axis, plane.normal)) <= PARALLEL:
-                stopped |= mask
-        masks.append(used & ~stopped)
-    number = [next(k for k in range(3) if np.array_equal(masks[k], mask)) for mask in masks]
-    distinct = sorted(set(number))
-    return [masks[k] for k in distinct], np.array([distinct.index(k) for k in number])
 
 
 def _one_unknown_each(vertices: Bools) -> MotionSpace:

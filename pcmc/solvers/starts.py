@@ -11,7 +11,7 @@ from ..forces.pinching import place_wall_rows
 from ..forces.wall_rows import find_walls
 from ..meshing.quality import in_the_middle, triangle_quality
 from ..surface import Surface
-from ..surface.geometry import cross_2d
+from ..surface.geometry import bounding_size, cross_2d
 from ..surface.pieces import to_space
 
 RISE = 0.1  # of the supports' extent along Π: height of a low start over the lowest surface
@@ -40,27 +40,26 @@ def low_start(surface: Surface) -> Surface | None:
         return None  # they lie on one line
     walls = surface.auxiliary[surface.patch_of_face]
     faces = surface.faces[~walls] if not walls.all() else surface.faces
-    roof = np.zeros(surface.n, dtype=bool)
-    roof[faces] = True
+    roof = np.isin(np.arange(surface.n), faces)
     held = surface.pinned | surface.on_ground
     place = surface.plane.to_local(surface.vertices)
-    corners = place[faces, :2] - place[faces[:, :1], :2]
+    flat = place[:, :2].copy()
+    corners = flat[faces] - flat[faces[:, :1]]
     turns = np.sign(cross_2d(corners[:, 1], corners[:, 2]))
     plan = triangle_quality(place * [1.0, 1.0, 0.0], faces)
-    extent, span = _diagonal(place[roof]), _diagonal(place[held]) or _diagonal(place[roof])
+    extent, span = bounding_size(flat[roof]), bounding_size(flat[held]) or bounding_size(flat[roof])
     kept = np.abs(turns.sum()) == len(turns) and plan.min() > FAILED and extent < WIDE * span
     low = place.copy()
     if not kept and surface.on_planes:
         return None  # spread anew, its boundary would leave the planes
     if not kept:
-        low[:, :2] = in_the_middle(faces, surface.fixed | ~roof, place[:, :2])
+        low[:, :2] = in_the_middle(faces, surface.fixed | ~roof, flat)
     known = held | ~roof
     low[:, 2] = in_the_middle(faces, known, place[:, 2])
     # a dome: 1 above the mean of the neighbours
     above = place[:, 2] - low[:, 2] if kept else in_the_middle(faces, known, np.zeros(surface.n), 1.0)
     if not (kept or walls.all()):
-        domed = _at(surface, low + above[:, None] * [0.0, 0.0, 1.0])
-        above *= np.sign(total_load(domed)) or 1.0
+        above *= np.sign(total_load(_at(surface, low + above[:, None] * [0.0, 0.0, 1.0]))) or 1.0
     rise, most = RISE * span, float(np.abs(above[roof]).max())
     if surface.net_pressures.any() and most > 0.0:
         low[:, 2] += above * min(1.0, rise / most) if kept else above * (rise / most)
@@ -71,13 +70,7 @@ def low_start(surface: Surface) -> Surface | None:
     if (surface.held & ~(roof | held)).any():  # the others follow those that went back to their planes
         place = surface.plane.to_local(moved.vertices)
         moved = _at(surface, in_the_middle(surface.faces, roof | surface.held, place))
-    walls_below = find_walls(moved)
-    return moved.moved(place_wall_rows(moved, walls_below, moved.vertices))
-
-
-def _diagonal(place: Floats) -> float:
-    """Diagonal of the bounding box along Π of coordinates (k,3)."""
-    return float(np.linalg.norm(np.ptp(place[:, :2], axis=0)))
+    return moved.moved(place_wall_rows(moved, find_walls(moved), moved.vertices))
 
 
 def _at(surface: Surface, place: Floats) -> Surface:

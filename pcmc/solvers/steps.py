@@ -101,14 +101,11 @@ class Stepper:
             self._smoother_age = 0
         self._smoother_age += 1
         d, pressures = self._smooth_direction(self._smoother)
-        energy, slope = state.energy, float((at.unbalanced * d).sum())
-        if len(pressures):
-            energy, slope = self._lagrangian(d, pressures, at.unbalanced)
-            state.change_pressures(pressures)
+        energy, slope = self._lagrangian(d, pressures, at.unbalanced)
+        state.change_pressures(pressures)
         for t in 0.5 ** np.arange(12):
             X, down = state.displaced(t * d)
-            value = state.energy_at(X)
-            if reachable(X) and value < energy + 1e-3 * t * slope:
+            if reachable(X) and state.energy_at(X) < energy + 1e-3 * t * slope:
                 state.move(X, down)
                 self.second, self.kind = None, "descent"
                 return True
@@ -127,8 +124,7 @@ class Stepper:
         G = at.volume_gradients
         inflation = np.stack([smoother.solve(at.space.project(g)) for g in G])
         growth = -self._volumes_ahead() - np.einsum("rnd,nd->r", G, d)
-        small = np.einsum("rnd,snd->rs", G, inflation)
-        pressures = np.linalg.lstsq(small, growth)[0]
+        pressures = np.linalg.lstsq(np.einsum("rnd,snd->rs", G, inflation), growth)[0]
         return d + np.tensordot(pressures, inflation, axes=1), pressures
 
     def _volumes_ahead(self) -> Floats:
@@ -140,8 +136,7 @@ class Stepper:
     def _lagrangian(self, d: Floats, pressures: Floats, forces: Floats) -> tuple[float, float]:
         """The Lagrangian here and its slope along d (n,3), with the rooms' pressures changed."""
         at = self.state.at
-        growth = np.einsum("rnd,nd->r", at.volume_gradients, d)
-        slope = float((forces * d).sum() - pressures @ growth)
+        slope = float((forces * d).sum() - pressures @ np.einsum("rnd,nd->r", at.volume_gradients, d))
         return self.state.energy - float(pressures @ at.volume_defects), slope
 
     def saddle_near(self) -> bool:
@@ -169,27 +164,19 @@ class Stepper:
         if (unit * normals).sum() < 0.0:
             unit = -unit  # outwards first, whichever way the surface is turned
         for direction in (unit, -unit):
-            X = self._downhill(direction)
-            if X is not None:
-                state.go_to(X)
+            best, lowest_energy = None, state.energy
+            for t in 1e-3 * 2.0 ** np.arange(7):
+                X, down = state.displaced(t * direction)
+                X = state.keep_volumes(X)
+                value = state.energy_at(X)
+                if not value < lowest_energy or down.any() or state.spoils_triangles(X):
+                    break
+                best, lowest_energy = X, value
+            if best is not None:
+                state.go_to(best)
                 self.second, self.kind = None, "saddle"
                 return True
         return False
-
-    def _downhill(self, unit: Floats) -> Floats | None:
-        """X farthest along a motion of unit length, in doubling steps on which E keeps falling; or None."""
-        state = self.state
-        best, lowest_energy = None, state.energy
-        t = 1e-3
-        while t < 0.1:
-            X, down = state.displaced(t * unit)
-            X = state.keep_volumes(X)
-            value = state.energy_at(X)
-            if not value < lowest_energy or down.any() or state.spoils_triangles(X):
-                break
-            best, lowest_energy = X, value
-            t *= 2.0
-        return best
 
     def factorise(self) -> SecondVariation | None:
         """Factorise; where a minimum is sought, with shifts until no eigenvalue is negative."""
@@ -204,14 +191,6 @@ class Stepper:
                 return second
         return None
 
-    def _in_basis_of(self, second: SecondVariation, action: Callable[[Floats], Floats], z: Floats) -> Floats:
-        """Apply an action in the basis that a factor was made in to z (N+r,), given in the present one."""
-        now, then = self.state.at.space, second.of.space
-        if now is then:
-            return action(z)
-        out = action(np.append(then.to_coordinates(now.to_vectors(z[: now.size])), z[now.size :]))
-        return np.append(now.to_coordinates(then.to_vectors(out[: now.size])), out[now.size :])
-
     def direction(self, second: SecondVariation) -> tuple[Floats, Floats, int]:
         """-B J⁻¹ r (n,3), the changes (r,) of the rooms' pressures, and the steps that GMRES took.
 
@@ -219,17 +198,23 @@ class Stepper:
         factor is added to J, too: otherwise motions that cost no energy would use up the accuracy.
         """
         at, added = self.state.at, second.added_matrix
-        size = at.space.size
+        now, then, size = at.space, second.of.space, at.space.size
         right = np.append(-at.forces, -at.volume_units * self._volumes_ahead())
 
+        def in_basis_then(action: Callable[[Floats], Floats], z: Floats) -> Floats:
+            if now is then:
+                return action(z)
+            out = action(np.append(then.to_coordinates(now.to_vectors(z[:size])), z[size:]))
+            return np.append(now.to_coordinates(then.to_vectors(out[:size])), out[size:])
+
         def times(z: Floats) -> Floats:
-            change = at.times(at.space.to_vectors(z[:size]), z[size:])
+            change = at.times(now.to_vectors(z[:size]), z[size:])
             if added is not None:
-                change[:size] += self._in_basis_of(second, added.__matmul__, z[:size])
+                change[:size] += in_basis_then(added.__matmul__, z[:size])
             return change
 
         def inverse(z: Floats) -> Floats:
-            return self._in_basis_of(second, second.bordered.solve, z)
+            return in_basis_then(second.bordered, z)
 
         if second.stiffness != 0.0:
             z, steps = inverse(right), 0
@@ -239,19 +224,12 @@ class Stepper:
             self.state.evaluations += steps
         s = at.across_carried(z[:size])
         if second.stiffness == 0.0 and len(at.rigid_motions):
-            s = self._limit_drift(s)
+            drift = at.rigid @ (at.rigid.T @ s)
+            far = float(np.abs(at.space.to_vectors(drift)).max())
+            most = DRIFT * float(np.median(edge_lengths(at.shape)))
+            if far > most:  # the rigid part only slides the mesh; the residual may rise for a while
+                s, self._residual_raised = s - (1.0 - most / far) * drift, False
         return at.space.to_vectors(s), z[size:] * at.volume_units, steps
-
-    def _limit_drift(self, s: Floats) -> Floats:
-        """s with its rigid part shortened, which only slides the mesh; the residual may rise for a while."""
-        at = self.state.at
-        drift = at.rigid @ (at.rigid.T @ s)
-        far = float(np.abs(at.space.to_vectors(drift)).max())
-        most = DRIFT * float(np.median(edge_lengths(at.shape)))
-        if far <= most:
-            return s
-        self._residual_raised = False
-        return s - (1.0 - most / far) * drift
 
     def _with_sheets(self, d: Floats) -> Floats:
         """The motion d with the insides of the sheets following their curves."""

@@ -6,15 +6,12 @@ preconditions GMRES. Where J is singular, as at a fold, the bordered matrix is n
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..base.arrays import Floats
-from .factorisation import TINY, Factor, Inverse, SingularMatrix
+from .factorisation import TINY, Factor, Linear, SingularMatrix
 
-Times = Callable[[Floats], Floats]
 CLOSE = 1e-12  # cosine of Q and A⁻¹Q: below, rounding may have chosen its sign
 
 
@@ -24,45 +21,39 @@ class BorderedFactor:
     It exists where A is singular along P alone. Near there the factor of A loses digits, and the inverse is a
     preconditioner.
 
-    >>> class Diagonal:
-    ...     def solve(self, right):
-    ...         return (right.T / [2.0, -1.0]).T
     >>> P = np.array([[1.0], [0.0]])
-    >>> BorderedFactor(Diagonal(), -P, P.T).solve(np.array([0.0, 1.0, 3.0])).tolist()
+    >>> inner = lambda right: (right.T / [2.0, -1.0]).T
+    >>> BorderedFactor(inner, -P, P.T).solve(np.array([0.0, 1.0, 3.0])).tolist()
     [3.0, -1.0, 6.0]
     """
 
-    def __init__(self, inner: Inverse, columns: Floats, rows: Floats, corner: float = 0.0) -> None:
-        self._inner, self._rows, self._behind = inner, rows, inner.solve(columns)
+    def __init__(self, inner: Linear, columns: Floats, rows: Floats, corner: float = 0.0) -> None:
+        self._inner, self._rows, self._behind = inner, rows, inner(columns)
         self.schur = corner - rows @ self._behind  # (k,k)
 
     def solve(self, right: Floats) -> Floats:
         """(s, μ) (N+k,) with A s + P μ and Q s + D μ as given in ``right``, or several of them (N+k,j)."""
         size = len(self._behind)
-        s = self._inner.solve(right[:size])
+        s = self._inner(right[:size])
         multipliers = np.linalg.pinv(self.schur) @ (right[size:] - self._rows @ s)
         return np.concatenate([s - self._behind @ multipliers, multipliers])
 
 
-class AcrossFactor:
+def across(inner: Linear, Q: Floats) -> Linear:
     """The inverse of A across columns Q (N,k): y with A y - b in their span, and Qᵀ y = 0."""
+    if not Q.shape[1]:
+        return inner
+    behind = inner(Q)
 
-    def __init__(self, inner: Inverse, columns: Floats) -> None:
-        self._inner, self._columns, self._behind = inner, columns, inner.solve(columns)
+    def solve(right: Floats) -> Floats:
+        y = inner(right)
+        return np.asarray(y - behind @ np.linalg.solve(Q.T @ behind, Q.T @ y))
 
-    @classmethod
-    def of(cls, inner: Inverse, columns: Floats) -> Inverse:
-        """That inverse, or A's own where there are no columns."""
-        return cls(inner, columns) if columns.shape[1] else inner
-
-    def solve(self, right: Floats) -> Floats:
-        """y (N,) for b as given, or several of them (N,j)."""
-        y, Q = self._inner.solve(right), self._columns
-        return np.asarray(y - self._behind @ np.linalg.solve(Q.T @ self._behind, Q.T @ y))
+    return solve
 
 
 def solve_preconditioned(
-    times: Times, inverse: Times, right: Floats, accuracy: float, *, restart: int, cycles: int = 1
+    times: Linear, inverse: Linear, right: Floats, accuracy: float, *, restart: int, cycles: int = 1
 ) -> tuple[Floats, list[float]]:
     """z with ``times(z)`` = right (N,) to a relative accuracy, by GMRES, and the residual after each step:
     that of ``inverse(times(z))``, over the norm of ``right``."""

@@ -27,8 +27,8 @@ from ..forces.second_variation import assemble
 from ..surface import Surface
 from ..surface.geometry import face_areas, vertex_area_vectors
 from ..surface.supports import apply_supports
-from .bordered import AcrossFactor, BorderedFactor, negatives_without
-from .factorisation import Factor, Factoriser, Inverse, SingularMatrix, factoriser
+from .bordered import BorderedFactor, across, negatives_without
+from .factorisation import Factor, Factoriser, Linear, SingularMatrix, factoriser
 
 STRONG = 1e-6  # of the largest tension: where all are at least this, factors need no units
 SOFT = 1e-9  # of the stiffness BᵀLB, added where a matrix is singular
@@ -366,15 +366,13 @@ class SecondVariation:
         return self.pattern.symmetric(self.of.matrix(0.0, self.added)) if self.added else None
 
     @cached_property
-    def bordered(self) -> Inverse:
+    def bordered(self) -> Linear:
         """The inverse of ``Equilibrium.times``, with A in the place of J, across the motions carried."""
-        inner = AcrossFactor.of(self.factor, self.of.carried[0])
-        if not self.of.surface.rooms:
-            return inner
+        inner = across(self.factor.solve, self.of.carried[0])
         columns = self.of.volume_columns * self.of.volume_units
-        return BorderedFactor(inner, -columns, columns.T)
+        return BorderedFactor(inner, -columns, columns.T).solve if self.of.surface.rooms else inner
 
     @cached_property
-    def solve(self) -> Callable[[Floats], Floats]:
+    def solve(self) -> Linear:
         """The inverse of A among the motions that count: with none of the excluded ones."""
-        return AcrossFactor.of(self.factor, self.of.excluded).solve
+        return across(self.factor.solve, self.of.excluded)

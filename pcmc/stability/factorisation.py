@@ -32,8 +32,10 @@ from ..base.errors import MissingExtra, PcmcError
 from ..forces.pattern import Pattern
 from .diagonal_pivots import ZERO, SingularMatrix, count_negative
 
-__all__ = ("BACKENDS", "Factor", "Factoriser", "Inverse", "SingularMatrix", "factoriser", "installed")
+__all__ = ("BACKENDS", "Factor", "Factoriser", "Linear", "SingularMatrix", "factoriser", "installed")
 BACKENDS = ("pardiso", "superlu")
+Linear = Callable[[Floats], Floats]
+"""A linear map, such as A⁻¹, of one vector (N,) or several (N,k)."""
 TINY = float(np.finfo(float).tiny)
 ONE_THREAD = 10_000  # rows; up to here MKL is fastest with one thread
 
@@ -49,18 +51,11 @@ IPARM = {  # MKL's parameters by their numbers from 1
 }
 
 
-class Inverse(Protocol):
-    """Solves with a matrix A."""
-
-    def solve(self, right: Floats) -> Floats:
-        """A⁻¹ right, for one right-hand side (N,) or several (N,k)."""
-
-
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """A factorised matrix, an ``Inverse``."""
+    """A factorised matrix A."""
 
-    solve: Callable[[Floats], Floats]
+    solve: Linear
     count: Callable[[], int]
     lu: Any = None  # SuperLU's factors, if it made them
 

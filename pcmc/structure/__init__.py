@@ -10,22 +10,6 @@ from .members import Member, PlacedMember
 from .model import StructuralModel
 from .results import StepResults, read_results
 
-__all__ = [
-    "Analysis",
-    "Case",
-    "Gas",
-    "Material",
-    "Member",
-    "PlacedMember",
-    "Profile",
-    "SelfWeight",
-    "Snow",
-    "Step",
-    "StepResults",
-    "StructuralModel",
-    "Wind",
-    "analyse",
-    "drawn_members",
-    "read_results",
-    "write_structure",
-]
+__all__ = ["Analysis", "Case", "Gas", "Material", "Member", "PlacedMember", "Profile", "SelfWeight", "Snow"]
+__all__ += ["Step", "StepResults", "StructuralModel", "Wind", "analyse", "drawn_members", "read_results"]
+__all__ += ["write_structure"]

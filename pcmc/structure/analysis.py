@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from itertools import takewhile
+from functools import cached_property
+from itertools import product, takewhile
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,8 @@ STILL = 1e-9  # of the largest displacement: a smaller deflection is rounding
 STRONGER = 1.1  # the first factor tried on a prestress that is too small, over what the share asks for
 FARTHER = 1.35  # each further factor over the one before
 TRIES = 4
+COLUMNS = ["case", "share", "taut", "down", "up", "moved", *"xyz", "least_force", "largest_force"]
+COLUMNS += ["least_x", "least_y", "least_z", "slack_area", "slack_share", *FORCE, "pressure", "volume"]
 MESH = "beyond the first slack part a share depends on the mesh; the share before that hardly does"
 OnCase = Callable[[str], object]  # called with a few words before each case
 
@@ -53,8 +55,8 @@ class Case:
     ----------
     name : of the step.
     results : at the share of the load that was reached.
-    share : of the loads besides the form-finding load and self-weight: 1 if all of it is carried. Where
-        self-weight itself is not carried it is 0, and the results are those of the share of self-weight.
+    share : of the loads besides the form-finding load and self-weight; 1 if all is carried, 0 where
+        self-weight is not: then the results are those of the share of self-weight.
     pressure, volume : of the enclosed gas, NaN without one.
     """
 
@@ -86,7 +88,6 @@ class Analysis:
 
     Attributes
     ----------
-    model : the model.
     cases : the form-finding load first, then the loads and combinations.
     remedy : a factor on all tensions and pressures, tried: with it the same shape carries all cases; 0 where
         none of those tried is enough, None where none was tried.
@@ -116,40 +117,33 @@ class Analysis:
         and ``slack_share``, that over the area; ``force_x``, …, the sum of all reactions. With a gas
         ``pressure`` and ``volume``.
         """
-        rows, surface, areas = [], self.model.surface, self._areas
+        rows, surface, areas = list[list[object]](), self.model.surface, self._areas
         for case in self.cases:
             found, forces = case.results, case.results.principal_forces
-            size = np.linalg.norm(found.displacements, axis=1)
+            size, up = np.linalg.norm(found.displacements, axis=1), found.deflections
             far, slack = int(np.nanargmax(size)), areas[found.slack].sum()
             place = surface.vertices[surface.faces[self.slackest(case)]].mean(axis=0)
-            row = {"case": case.name, "share": case.share, "taut": case.taut}
-            row["down"], row["up"] = -np.nanmin(found.deflections), np.nanmax(found.deflections)
-            row |= {way: row[way] if row[way] > STILL * size[far] else 0.0 for way in ("down", "up")}
-            row |= {"moved": size[far]} | dict(zip("xyz", surface.vertices[far], strict=True))
-            row |= {"least_force": np.nanmin(forces), "largest_force": np.nanmax(forces)}
-            row |= {f"least_{axis}": value for axis, value in zip("xyz", place, strict=True)}
-            row |= {"slack_area": slack, "slack_share": slack / areas.sum()}
-            row |= dict(zip(FORCE, found.reactions.sum(axis=0), strict=True))
-            row |= {"pressure": case.pressure, "volume": case.volume} if self.model.gas is not None else {}
-            rows.append(row)
-        return pd.DataFrame(rows)
+            ways = (way if way > STILL * size[far] else 0.0 for way in (-np.nanmin(up), np.nanmax(up)))
+            row = [case.name, case.share, case.taut, *ways, size[far], *surface.vertices[far]]
+            row += [np.nanmin(forces), np.nanmax(forces), *place, slack, slack / areas.sum()]
+            rows.append([*row, *found.reactions.sum(axis=0), case.pressure, case.volume])
+        table = pd.DataFrame(rows, columns=COLUMNS)
+        return table if self.model.gas is not None else table.drop(columns=["pressure", "volume"])
 
     @cached_property
     def patches(self) -> pd.DataFrame:
         """A row per case and patch: ``least_force``, ``mean_force`` and ``largest_force`` of the principal
         membrane forces, force/length, and ``slack_area``."""
-        rows, patch_of = [], self.model.surface.patch_of_face
-        for case in self.cases:
+        rows, patch_of = list[list[object]](), self.model.surface.patch_of_face
+        for case, (k, patch) in product(self.cases, enumerate(self.model.surface.patches)):
             forces = case.results.principal_forces
-            for k, patch in enumerate(self.model.surface.patches):
-                mine = (patch_of == k) & np.isfinite(forces).all(axis=1)
-                if mine.any():
-                    area, own = self._areas[mine], forces[mine]
-                    row = {"case": case.name, "patch": patch.name, "least_force": own.min()}
-                    row |= {"mean_force": float(area @ own.mean(axis=1) / area.sum())}
-                    row |= {"largest_force": own.max(), "slack_area": area[case.results.slack[mine]].sum()}
-                    rows.append(row)
-        return pd.DataFrame(rows)
+            mine = (patch_of == k) & np.isfinite(forces).all(axis=1)
+            if mine.any():
+                area, own = self._areas[mine], forces[mine]
+                mean, slack = area @ own.mean(axis=1) / area.sum(), area[case.results.slack[mine]].sum()
+                rows.append([case.name, patch.name, own.min(), mean, own.max(), slack])
+        head = ["case", "patch", "least_force", "mean_force", "largest_force", "slack_area"]
+        return pd.DataFrame(rows, columns=head)
 
     @cached_property
     def supports(self) -> pd.DataFrame:
@@ -188,9 +182,8 @@ class Analysis:
     def tables(self) -> dict[str, pd.DataFrame]:
         """All tables by name; those of cables, members and columns only if there are any."""
         tables = {"cases": self.table, "patches": self.patches, "supports": self.supports}
-        others = {"cables": self.cables, "members": self.members, "member-forces": self.member_forces}
-        others["columns"] = self.columns
-        return tables | {name: table for name, table in others.items() if len(table)}
+        tables |= {"cables": self.cables, "members": self.members, "member-forces": self.member_forces}
+        return {name: table for name, table in (tables | {"columns": self.columns}).items() if len(table)}
 
     def slackest(self, case: Case) -> int:
         """The triangle whose least principal force is the smallest."""
@@ -209,16 +202,16 @@ class Analysis:
         that gets slack; what cables are made of, where they have no material of their own."""
         units, lines, surface = units or self.model.units, [], self.model.surface
         for case, row in zip(self.cases, self.table.to_dict("records"), strict=True):
-            at = np.array([row[f"least_{c}"] for c in "xyz"])
+            at, slack = np.array([row[f"least_{c}"] for c in "xyz"]), row["slack_area"] > 0.0
             patch = surface.patches[surface.patch_of_face[self.slackest(case)]].name
             state = f"slack from {100.0 * case.taut:.0f} % on, over {row['slack_area']:.3g}"
-            state = f"{state}{units.behind('area')}" if row["slack_area"] > 0.0 else "nothing is slack yet"
+            state = f"{state}{units.behind('area')}" if slack else "nothing is slack yet"
             state += f", the least force {row['least_force']:.3g}{units.behind('tension')}"
             state += f" around {point_text(at, surface.size)} of {patch!r}"
+            share = f"{100.0 * case.share:.0f} % of its loads" if case.share else "not its self-weight"
             if not case.carried:
-                share = f"{100.0 * case.share:.0f} % of its loads" if case.share else "not its self-weight"
                 lines.append(f"{case.name}: {share} carried, then it gives way; {state}")
-            elif row["slack_area"] > 0.0:
+            elif slack:
                 lines.append(f"{case.name}: carried, but {state}: there it wrinkles")
             if (depth := self.sunk(case)) > 0.0:
                 below = f"it hangs up to {depth:.3g}{units.behind('length')} below the plane"
@@ -237,16 +230,14 @@ class Analysis:
         return lines
 
     def __str__(self) -> str:
-        """The units, the main columns of the table, and the answers."""
         return f"{self.model.units.sentence}\n{self.text()}" if self.model.units else self.text()
 
     def text(self) -> str:
         """The main columns of the table, and the answers, without the units of the numbers."""
         model, units = self.model, self.model.units
-        shown = ["case", "share", "taut", "down", "up", "least_force", "largest_force", "slack_area"]
-        shown += ["pressure"] if model.gas is not None else []
         heads = {"least_force": "least force", "largest_force": "largest", "slack_area": "slack area"}
-        table = self.table[shown].rename(columns=heads)
+        shown = ["case", "share", "taut", "down", "up", *heads, "pressure"]
+        table = self.table.filter(shown).rename(columns=heads)
         for name in ("share", "taut"):
             table[name] = [f"{100.0 * share:.0f} %" for share in table[name]]
         look: dict[str, Any] = {"index": False, "float_format": "{:.4g}".format, "na_rep": "-"}
@@ -271,12 +262,11 @@ def analyse(
     """Run CalculiX on a structural model: each case and combination on its own, as far as it is carried.
 
     A case starts from the form-finding load and self-weight. Its loads grow until all of them act, or no
-    equilibrium is found: membranes whose prestress is used up carry nothing across. Then the case ends with
-    the share of its loads that was reached. With an enclosed gas its pressure is found, too.
+    equilibrium is found: membranes whose prestress is used up carry nothing across. With an enclosed gas its
+    pressure is found, too.
 
     Parameters
     ----------
-    model : the model, with its loads and combinations.
     timeout : seconds for each run of the program; by default none.
     remedy : where a case is not carried, try the same shape with larger tensions and pressures.
     progress : called with a few words before each case.
@@ -304,8 +294,16 @@ def analyse(
         steps, others = steps[:1], [*permanent, *others]
     start = run_as_far(model, steps, timeout)
     cases = [_case_of(model, step.name, start[:k], k) for k, step in enumerate(steps, 1)]
-    one = partial(analyse_step, model, permanent, timeout=timeout)
-    analysis = Analysis(model, (*cases, *_in_parallel(one, others, say)))
+    # as many cases at a time as there are cores
+    with ThreadPoolExecutor(max_workers=max(1, min(len(others), os.cpu_count() or 1))) as pool:
+        running = [pool.submit(analyse_step, model, permanent, step, timeout) for step in others]
+        try:
+            for k, (step, future) in enumerate(zip(others, running, strict=True), 1):
+                say(f"{step.name}, case {k} of {len(others)}")
+                cases.append(future.result())
+        finally:  # after Ctrl-C or an error no other case begins
+            pool.shutdown(wait=False, cancel_futures=True)
+    analysis = Analysis(model, tuple(cases))
     if analysis.carried or not remedy or model.surface.heavy:  # with weights the form would be another one
         return analysis
     return replace(analysis, remedy=_remedy(analysis, timeout, say))
@@ -359,23 +357,12 @@ def _case_of(
 ) -> Case:
     """The case from the results of its steps: of the last one that was begun; ``p`` of a gas, by default the
     form's."""
-    share, gas, form = found[-1].share if len(found) == wanted else 0.0, model.gas, model.standing
+    gas, form = model.gas, model.standing
+    case = Case(name, found[-1], found[-1].share if len(found) == wanted else 0.0)
     if gas is None:
-        return Case(name, found[-1], share)
+        return case
     volume = gas.enclosed(form, np.nan_to_num(found[-1].displacements))
-    return Case(name, found[-1], share, gas.pressure(form) if p is None else p, volume)
-
-
-def _in_parallel(one: Callable[[Step], Case], steps: Sequence[Step], say: OnCase) -> Iterable[Case]:
-    """The cases of steps, in order; as many at a time as there are cores."""
-    with ThreadPoolExecutor(max_workers=max(1, min(len(steps), os.cpu_count() or 1))) as pool:
-        running = [pool.submit(one, step) for step in steps]
-        try:
-            for k, (step, future) in enumerate(zip(steps, running, strict=True), 1):
-                say(f"{step.name}, case {k} of {len(steps)}")
-                yield future.result()
-        finally:  # after Ctrl-C or an error no other case begins
-            pool.shutdown(wait=False, cancel_futures=True)
+    return replace(case, pressure=gas.pressure(form) if p is None else p, volume=volume)
 
 
 def _remedy(analysis: Analysis, timeout: float | None, say: OnCase) -> float:

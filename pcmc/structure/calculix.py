@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from ..base.errors import FileError, PcmcError
 from ..base.files import writing
@@ -56,10 +57,8 @@ def run_as_far(
     model: StructuralModel, steps: Sequence[Step], timeout: float | None = None
 ) -> tuple[StepResults, ...]:
     """The results of these steps of a model, as far as the program finds equilibria; see ``read_steps``.
-
     CalculixError where it finds none even for the first of them, the form-finding load; OptionError where a
-    material's law does not hold.
-    """
+    material's law does not hold."""
     # where beams meet the program compares 1e-5 to terms of 1/length: in mm it misses what it finds in m
     unit = 10.0 ** max(round(math.log10(model.surface.size / USUAL_SIZE)), 0)
     with folder_for_input() as path:
@@ -67,10 +66,11 @@ def run_as_far(
             path.write_text(text_of(model, steps, every=True, unit=unit), encoding="utf-8", newline="\n")
         with suppress(NotConverged):
             run_file(path, timeout)
+        results = path.with_suffix(".dat")
         try:
-            found = read_steps(path.with_suffix(".dat"), model, steps, unit)
+            found = read_steps(results, model, steps, unit)
         except FileError as error:
-            text = str(error).removeprefix(f"{path.with_suffix('.dat')}: ")
+            text = str(error).removeprefix(f"{results}: ")
             raise CalculixError(f"{PROGRAM}: the results of step {steps[0].name!r}: {text}") from None
     if not found or found[0].share < 1.0:
         text = f"{PROGRAM} finds no equilibrium under the form-finding load alone; is the surface certified?"
@@ -81,7 +81,7 @@ def run_as_far(
             text += "; ".join(filter(None, unheld)) or "make them stiffer"
         raise CalculixError(text, what=steps[0].name)
     for result in found:
-        result.thicknesses  # noqa: B018
+        result.thicknesses  # noqa: B018 — refuses strains that leave none
     return found
 
 
@@ -93,24 +93,14 @@ def folder_for_input() -> Iterator[Path]:
 
 
 def run_file(path: Path, timeout: float | None = None) -> str:
-    """What the program prints for an input file; its results go beside the file.
-
-    One thread: with several, sums of forces differ in their last digits from run to run. ``timeout`` is in
-    seconds. CalculixError, in one line with what the program says, where it stops.
-    """
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "CCX_NPROC_STIFFNESS", "NUMBER_OF_CPUS"), "1")
+    """What the program prints for an input file; its results go beside the file. One thread: with several,
+    sums of forces differ in their last digits from run to run. ``timeout`` is in seconds. CalculixError, in
+    one line with what the program says, where it stops."""
+    one = dict.fromkeys(("OMP_NUM_THREADS", "CCX_NPROC_STIFFNESS", "NUMBER_OF_CPUS"), "1")
+    how: Any = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "errors": "replace"}
+    how |= {"timeout": timeout, "cwd": path.parent, "env": {**os.environ, **one}, "check": False}
     try:
-        done = subprocess.run(
-            [PROGRAM, path.stem],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=timeout,
-            cwd=path.parent,
-            env={**os.environ, **threads},
-            check=False,
-        )
+        done = subprocess.run([PROGRAM, path.stem], **how)
     except OSError:  # not there, or no program
         raise CalculixError(MISSING, what=PROGRAM) from None
     except subprocess.TimeoutExpired:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -45,32 +46,26 @@ def columns_at_rest(model: StructuralModel) -> pd.DataFrame:
 
 
 def column_table(model: StructuralModel, cases: Iterable[tuple[str, Floats]]) -> pd.DataFrame:
-    """A row per case and bar, from the reactions (n,3) in each case.
-
-    Columns: ``case``, ``member``, ``kind``, column or stay; ``x``, ``y``, ``z`` of the point that it holds;
-    ``length``; ``N``, tension above 0; ``stress`` N/A; ``utilisation``, |stress| over the strength, NaN where
-    that is not given; ``euler``, the load under which a column buckles, and ``euler_over``, that over the
-    thrust, NaN without one; ``slack``, whether it is a stay that would be pressed and is left out;
-    ``left_x``, …, the force that the bars at the point leave to others.
-    """
+    """A row per case and bar, from the reactions (n,3) in each case. Columns: ``case``, ``member``, ``kind``,
+    column or stay; ``x``, ``y``, ``z`` of the point that it holds; ``length``; ``N``, tension above 0;
+    ``stress`` N/A; ``utilisation``, |stress| over the strength, NaN where that is not given; ``euler``, the
+    load under which a column buckles, and ``euler_over``, that over the thrust, NaN without one; ``slack``,
+    whether it is a stay that would be pressed and is left out; ``left_x``, …, the force that the bars at the
+    point leave to others."""
     rows = list[list[object]]()
-    for case, reactions in cases:
-        for vertex, own in at_points(model.bars).items():
-            directions, force = np.array([bar.direction for bar in own]), reactions[vertex]
-            stays = np.array([bar.kind == "stay" for bar in own])
-            all_of_them = np.linalg.lstsq(directions.T, force, rcond=None)[0]
-            pressed = (stays & (all_of_them < -LEAST * np.linalg.norm(force))).any()
-            forces = lsq_linear(directions.T, force, (np.where(stays, 0.0, -np.inf), np.inf), method="bvls").x
-            left = force - forces @ directions
-            for bar, N in zip(own, forces.tolist(), strict=True):
-                member, column = bar.member, bar.kind == "column"
-                stress, EI = N / member.profile.area, member.material.young * min(member.profile.moments)
-                euler = math.pi**2 * EI / bar.length**2 if column else math.nan
-                used = abs(stress) / member.strength if member.strength else math.nan
-                over = euler / -N if N < 0.0 else math.nan
-                about = [case, bar.name, bar.kind, *bar.points[0], bar.length]
-                slack = pressed and not column and N <= 0.0
-                rows.append([*about, N, stress, used, euler, over, slack, *left])
+    for (case, reactions), (vertex, own) in product(cases, at_points(model.bars).items()):
+        directions, force = np.array([bar.direction for bar in own]), reactions[vertex]
+        stays = np.array([bar.kind == "stay" for bar in own])
+        all_of_them = np.linalg.lstsq(directions.T, force, rcond=None)[0]
+        pressed = (stays & (all_of_them < -LEAST * np.linalg.norm(force))).any()
+        forces = lsq_linear(directions.T, force, (np.where(stays, 0.0, -np.inf), np.inf), method="bvls").x
+        for bar, N, stay in zip(own, forces.tolist(), stays.tolist(), strict=True):
+            profile, strength = bar.member.profile, bar.member.strength or math.nan
+            stress, EI = N / profile.area, bar.member.material.young * min(profile.moments)
+            euler = math.nan if stay else math.pi**2 * EI / bar.length**2
+            row = [case, bar.name, bar.kind, *bar.points[0], bar.length, N, stress, abs(stress) / strength]
+            row += [euler, euler / -N if N < 0.0 else math.nan, pressed and stay and N <= 0.0]
+            rows.append([*row, *(force - forces @ directions)])
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
@@ -88,9 +83,9 @@ def column_answers(model: StructuralModel, table: pd.DataFrame, units: Units) ->
             thrust = f"{row['case']}: {bar.name} is pressed with {-row['N']:.3g}{force}"
             stiffer = f"it needs {1.0 / row['euler_over']:.2g} times its E I, without any safety"
             lines.append(f"{thrust} and buckles under {row['euler']:.3g}{force}; {stiffer}")
-        if (used := own["utilisation"].max()) > 1.0:
-            case = own["case"].iloc[int(np.nanargmax(own["utilisation"]))]
-            lines.append(f"{case}: {bar.name} has {used:.2g} times the stress of its strength")
+        for _, worst in own[own["utilisation"] > 1.0].nlargest(1, "utilisation").iterrows():
+            used = f"{worst['utilisation']:.2g} times the stress of its strength"
+            lines.append(f"{worst['case']}: {bar.name} has {used}")
     for _, own in table.groupby([*"xyz"], sort=False):
         left = own[["left_x", "left_y", "left_z"]].to_numpy()
         sizes = np.linalg.norm(left, axis=1)

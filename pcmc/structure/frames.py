@@ -1,10 +1,9 @@
-"""Frames of straight bars with bending: displacements, forces within the bars, and loads that buckle them.
+"""Frames of straight bars with bending, and the force along a line that balances what sheets pull it with.
 
-N, V and M of members all come from here. At rest there is no CalculiX; in its cases it has the displacements,
-but expands a beam to a brick, and has forces of sections in its files for viewers alone. Each bar from a to b
-has twelve coordinates: the displacements and turns of both ends. In its axes (x along it, z upright, y
-across) its stiffness K is that of Euler and Bernoulli: E A/L along it, G J/L in torsion, and in each of the
-planes of bending, with the displacements w and the slopes φ,
+At rest there is no CalculiX; in its cases it expands a beam to a brick, without forces of sections. A bar
+from a to b has twelve coordinates: the displacements and turns of both ends. In its axes (x along it, z
+upright, y across) its stiffness K is that of Euler and Bernoulli: E A/L along it, G J/L in torsion, and in
+each of the planes of bending, with the displacements w and the slopes φ,
 
     E I/L³ [[12, 6 L, -12, 6 L], [6 L, 4 L², -6 L, 2 L²], [-12, -6 L, 12, -6 L], [6 L, 2 L², -6 L, 4 L²]].
 
@@ -12,6 +11,16 @@ With loads at the ends of bars alone its forces at the ends are exact. A force N
 cubics between the ends, the stiffness G(N) (Przemieniecki 1968): N (I + I')/(A L) in torsion, and in bending
 
     N/(30 L) [[36, 3 L, -36, 3 L], [3 L, 4 L², -3 L, -L²], [-36, -3 L, 36, -3 L], [3 L, -L², -3 L, 4 L²]].
+
+Sheets of the tensions α pull a line with q = Σ α n per length, n the co-normals from the line into them. So q
+is across the line. A line that does not bend carries it by a force N along its tangent t,
+
+    (N t)' + q = N' t + N κ n + q = 0,     so     N' = 0   and   q = -N κ n,   n here the principal normal:
+
+N is the same all along, and q grows with the curvature. A wall of one tension α_w balances q = α_w, so a
+member in its place does not bend exactly if the line is an arc of a circle in the wall's plane, N = ±α_w r.
+Another line needs the pull |N| κ(s), which no wall of one tension has, and no wall at all where it curves to
+the other side. A cable of the tension N in the place of the wall finds a shape of its own.
 """
 
 from __future__ import annotations
@@ -26,7 +35,7 @@ from scipy.sparse import block_array, coo_array, csr_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from ..base.arrays import Floats, Ints
-from ..surface.geometry import unit_vectors
+from ..surface.geometry import area_vectors, edge_vectors, unit_vectors
 from ..surface.topology import components
 
 UPRIGHT = 1e-6  # sine of the angle to the upright below which a bar stands: its z is another direction
@@ -49,15 +58,12 @@ class BarFrame:
 
     def solved(self, forces: Floats) -> FrameForces:
         """Under forces (n,3) on the points. Where a part is not held, what is out of balance is left out."""
-        n = len(self.points)
-        factor, scale = self._factor
+        n, (factor, scale) = len(self.points), self._factor
         load = np.pad(np.pad(forces, ((0, 0), (0, 3))).ravel(), (0, factor.shape[0] - 6 * n))
-        found = factor.solve(load)
-        u = found[: 6 * n]
+        u, held, _ = np.split(factor.solve(load), [6 * n, 6 * n + len(self.holds)])
         ends = np.einsum("bij,bjk,bk->bi", self._own, self._turn, u[self._place])
-        reactions = -scale * (self.holds.T @ found[6 * n : 6 * n + len(self.holds)]).reshape(n, 6)
-        u = u.reshape(n, 6)
-        return FrameForces(u[:, :3], ends, reactions[:, :3], reactions[:, 3:])
+        reactions = -scale * (self.holds.T @ held).reshape(n, 6)
+        return FrameForces(u.reshape(n, 6)[:, :3], ends, reactions[:, :3], reactions[:, 3:])
 
     def buckling(self, N: Floats) -> float:
         """The factor on forces N (b,) along the bars, tension above 0, at which these buckle, loads keeping
@@ -126,11 +132,11 @@ class BarFrame:
         for part in np.unique(label[self.bars]):
             mine = label == part
             arms, still = self.points - self.points[mine].mean(axis=0), np.zeros_like(self.points)
-            size = float(np.abs(arms[mine]).max())
             for axis in np.eye(3):
                 shift, turn = [still + axis, still], [np.cross(axis, arms), still + axis]
-                motions += [np.hstack(shift) * mine[:, None], np.hstack(turn) / size * mine[:, None]]
-        R = np.array([motion.ravel() for motion in motions]).T
+                both = np.hstack(shift), np.hstack(turn) / np.abs(arms[mine]).max()
+                motions += [(motion * mine[:, None]).ravel() for motion in both]
+        R = np.array(motions).T
         free = null_space(self.holds @ R, rcond=LOOSE) if len(self.holds) else np.eye(R.shape[1])
         loose = np.linalg.qr(R @ free)[0].T if free.shape[1] else np.zeros((0, 6 * n))
         K = self._assembled(self._own)
@@ -151,22 +157,17 @@ class FrameForces:
     def within(self, chain: Ints, closed: bool = False) -> Floats:
         """(k,6) along bars (c,), each from where the one before ends, at their k points: N, tension above 0;
         the shear forces upright and across; the torque; the moments upright, above 0 with tension below, and
-        across. V = dM/ds.
-
-        Moments are those at the points; the other forces jump there, as loads do: the mean is taken, and at
-        ends the line through the two nearest bars.
-        """
+        across. V = dM/ds. Moments are those at the points; the other forces jump there, as loads do: the mean
+        is taken, and at ends the line through the two nearest bars."""
         columns, signs = [0, 2, 1, 3, 4, 5], [1.0, -1.0, -1.0, 1.0, -1.0, 1.0]
         first, last = -self.ends[chain, :6][:, columns] * signs, self.ends[chain, 6:][:, columns] * signs
-        middle = 0.5 * (first + last)
+        middle, before, after = 0.5 * (first + last)[:, :4], last[:, 4:], first[:, 4:]
         if closed:
-            before = np.roll(middle, 1, axis=0), np.roll(last, 1, axis=0)
-            return np.hstack([0.5 * (before[0] + middle)[:, :4], 0.5 * (before[1] + first)[:, 4:]])
-        far = middle[1:] if len(middle) > 1 else middle
-        ends = 1.5 * middle[:1] - 0.5 * far[:1], 1.5 * middle[-1:] - 0.5 * middle[-2:][:1]
-        forces = np.vstack([ends[0], 0.5 * (middle[:-1] + middle[1:]), ends[1]])
-        moments = np.vstack([first[:1], 0.5 * (last[:-1] + first[1:]), last[-1:]])
-        return np.hstack([forces[:, :4], moments[:, 4:]])
+            middle, before = np.vstack([middle[-1:], middle]), np.roll(before, 1, axis=0)
+        else:
+            middle = np.pad(middle, ((1, 1), (0, 0)), mode="reflect", reflect_type="odd")
+            before, after = np.vstack([after[:1], before]), np.vstack([after, before[-1:]])
+        return 0.5 * np.hstack([middle[:-1] + middle[1:], before + after])
 
 
 def bar_axes(X: Floats, bars: Ints, up: Floats) -> tuple[Floats, Floats]:
@@ -197,3 +198,53 @@ def _blocks(L: Floats, along: Floats, up: Floats, across: Floats, twist: Floats,
         block = factor[:, None, None] * unit * lengths[:, :, None] * lengths[:, None, :]
         K[:, np.array(place)[:, None], place] += block
     return K
+
+
+def in_planes(P: Floats) -> Floats:
+    """(e,3,3) I - ν ν of triangles (e,3,3), ν their normals: a tension of 1 in each of their directions.
+
+    >>> (in_planes(np.array([[[0.0, 0, 0], [2, 0, 0], [0, 2, 0]]])) + 0.0).tolist()
+    [[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]]
+    """
+    normal = unit_vectors(area_vectors(P))
+    return np.eye(3) - normal[:, :, None] * normal[:, None]
+
+
+def corner_forces(P: Floats, tensors: Floats) -> Floats:
+    """(e,3,3) the forces of membranes on the corners of their triangles P (e,3,3), from the tensors σ t
+    (e,3,3), force per length: -σ t ½ ν × e, with e the side opposite the corner and ν the normal.
+
+    >>> P = np.array([[[0.0, 0, 0], [2, 0, 0], [0, 2, 0]]])
+    >>> (corner_forces(P, np.diag([3.0, 0, 0])[None]) + 0.0).tolist()
+    [[[3.0, 0.0, 0.0], [-3.0, 0.0, 0.0], [0.0, 0.0, 0.0]]]
+    """
+    normal = unit_vectors(area_vectors(P))
+    return -0.5 * np.einsum("eij,ekj->eki", tensors, np.cross(normal[:, None], edge_vectors(P)))
+
+
+def turns(P: Floats, closed: bool) -> Floats:
+    """(k,3) at each point of a polyline (k,3) the direction of the next edge less that of the one before; at
+    ends that of the one edge, outward turned."""
+    t = unit_vectors((np.roll(P, -1, axis=0) if closed else P[1:]) - (P if closed else P[:-1]))
+    if closed:
+        return t - np.roll(t, 1, axis=0)
+    return np.vstack([t[:1], np.diff(t, axis=0), -t[-1:]])
+
+
+def balancing_force(P: Floats, pulls: Floats, closed: bool) -> tuple[float, float]:
+    """The force N along a polyline (k,3) that balances the pulls (k,3) at its points best, tension above 0;
+    and the share of the pulls that it leaves, 0 for a line that does not bend.
+
+    N minimises Σ |f + N Δt|² over the points between the ends; the share is the root of that over Σ |f|².
+
+    >>> arch = np.array([[-1.0, 0, 0], [0, 0, 1], [1, 0, 0]])
+    >>> N, share = balancing_force(arch, np.array([[0.0, 0, 0], [0, 0, 2**0.5], [0, 0, 0]]), closed=False)
+    >>> round(N, 6), round(share, 6)
+    (1.0, 0.0)
+    """
+    inner = slice(None) if closed else slice(1, -1)
+    turn, f = turns(P, closed)[inner], pulls[inner]
+    if not (f.any() and turn.any()):
+        return 0.0, float(f.any())
+    N = -float((f * turn).sum() / (turn * turn).sum())
+    return N, float(np.linalg.norm(f + N * turn) / np.linalg.norm(f))

@@ -71,19 +71,17 @@ class Gas:
 
     def signs(self, surface: Surface) -> Floats:
         """(k,) of each patch: 1 where it has the gas on its negative side, -1 on its positive one, else 0."""
-        chosen = [surface.patch_index(name) for name in self.patches]
-        pressures = surface.pressures
-        mine = np.isin(np.arange(len(pressures)), chosen) if chosen else surface.roof & (pressures != 0.0)
+        chosen, pressures = [surface.patch_index(name) for name in self.patches], surface.pressures
+        mine = np.unique(chosen) if chosen else np.flatnonzero(surface.roof & (pressures != 0.0))
         sizes = np.abs(pressures[mine])
         if not len(sizes) or sizes.min() == 0.0:
             text = "gas: no patch is under pressure" if not chosen else "gas: a patch of it has no pressure"
             raise OptionError(f"{text}; give it one, or leave out gas", what="Gas.patches")
         if np.ptp(sizes) > EVEN * sizes.max():
-            names = [patch.name for patch, m in zip(surface.patches, mine, strict=True) if m]
-            low, high = names[int(sizes.argmin())], names[int(sizes.argmax())]
+            low, high = (surface.patches[mine[k]].name for k in (sizes.argmin(), sizes.argmax()))
             text = f"gas: it has one pressure, but {low!r} has {sizes.min():g} and {high!r} {sizes.max():g}"
             raise OptionError(f"{text}; name the patches of one gas", what="Gas.patches")
-        return np.where(mine, np.sign(pressures), 0.0)
+        return np.sign(pressures) * np.isin(np.arange(len(pressures)), mine)
 
     def pressure(self, surface: Surface) -> float:
         """p of the form, against the air outside."""
@@ -123,12 +121,11 @@ def balanced_pressure(
         if high - low <= EXACT * abs(first):  # below it the structure does not carry, above it is too much
             break
         known += [(p, gap)] if np.isfinite(gap) else []
+        better = p + np.clip(gap, -step, step)
         if len(known) > 1:
             (a, f), (b, g) = known[-2:]
             better = b - g * (b - a) / (g - f) if g != f else p
-        else:
-            better = p + np.clip(gap, -step, step)
         if not low < better < high:
             better = 0.5 * (low + high)
-        p = float(np.clip(better, p - step, p + step)) if np.isfinite(better) else p + np.sign(gap) * step
+        p = float(np.clip(better, p - step, p + step))
     return answer, p, False

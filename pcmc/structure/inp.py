@@ -8,12 +8,11 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
-from typing import Any
 
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Floats, Ints, format_rows
+from ..base.arrays import Bools, Floats, Ints, format_rows
 from ..base.files import as_path, atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
 from ..forces.cables import pull_along
@@ -59,31 +58,29 @@ def text_of(
 ) -> str:
     """The input file of a model under these steps, the form-finding load first; with ``every`` it prints the
     results of each increment, and writes none for viewers. A length of 1 in the file is ``unit`` in the
-    model.
-    """
+    model."""
     surface, nodes, certificate = model.standing, np.flatnonzero(model.nodes), model.certificate
     heading = "pcmc structural model", certificate.mark or mark, certificate.verdict.value
     text = [f"*HEADING\n{'; '.join(filter(None, heading))}\n" + (f"** {model.note}\n" if model.note else "")]
-    text += [f"** PATCH_{k}: {_line(patch.name)}\n" for k, patch in enumerate(surface.patches, 1)]
     supports = certificate.supports[["support", "kind", "name"]].to_numpy().tolist()
-    text += [f"** SUPPORT_{label}: {kind}, {_line(name)}\n" for label, kind, name in supports]
-    text += [f"** step {k}: {_line(step.name)}\n" for k, step in enumerate(steps, 1)]
+    notes = [f"PATCH_{k}: {patch.name}" for k, patch in enumerate(surface.patches, 1)]
+    notes += [f"SUPPORT_{label}: {kind}, {name}" for label, kind, name in supports]
+    text += map(_comment, [*notes, *(f"step {k}: {step.name}" for k, step in enumerate(steps, 1))])
     text += [card("NODE, NSET=NALL", nodes + 1, surface.vertices[nodes] / unit)]
     number = np.arange(1, surface.n + 1)  # of the nodes of members: their own where they are tied
     number[model.tied] = model.surface.n + 1 + np.arange(len(model.tied))
-    parts = _elements(model, number, unit), _beams(model, number, unit), _ties(model, number)
-    text += chain(*parts, _supports(model))
+    text += chain(_elements(model, number, unit), _beams(model, number, unit), _ties(model, number))
+    text += _supports(model)
     # σ = α/t (I - ν ν) in each element, ν its normal: uniform in its plane; τ/a t t along a cable's edge
     prestress = [(model.faces + 1, model.stresses, POINTS)]
     for cable, area, _, numbers, along in model.cable_edges():
         pull = pull_along(surface, cable, cable.edges)[:, None, None]
         prestress += [(numbers, pull / area * along[:, :, None] * along[:, None, :], CABLE_POINTS)]
-    rows = list[tuple[Any, ...]]()  # a line for each integration point
-    for elements, stress, points in prestress:
+    text.append("*INITIAL CONDITIONS, TYPE=STRESS\n")
+    for elements, stress, points in prestress:  # a line for each integration point
         tensors = unit**2 * np.repeat(stress[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]], points, axis=0)
-        point = np.tile(np.arange(1, points + 1), len(elements))
-        rows.append((np.repeat(elements, points), point, tensors))
-    text += [card("INITIAL CONDITIONS, TYPE=STRESS", *map(np.concatenate, zip(*rows, strict=True)))]
+        point = np.tile(np.arange(points), len(elements)) + 1
+        text.append(_rows(np.repeat(elements, points), point, tensors))
     return "".join(chain(text, *(_step(model, step, k == 0, every, unit) for k, step in enumerate(steps))))
 
 
@@ -100,11 +97,10 @@ def _elements(model: StructuralModel, number: Ints, unit: float) -> Iterator[str
         if not material.cloth:
             yield f"*{section} SECTION, ELSET=PATCH_{k}, MATERIAL=PATCH_{k}\n{thickness}\n"
             continue
-        axes, which = np.unique(model.warps(k - 1).reshape(-1, 6).round(9) + 0.0, axis=0, return_inverse=True)
-        for a, row in enumerate(axes):
-            one = f"WARP_{k}_{a + 1}"
+        for a, (row, those) in enumerate(_alike(model.warps(k - 1).reshape(-1, 6)), 1):
+            one = f"WARP_{k}_{a}"
             yield f"*ORIENTATION, NAME={one}, SYSTEM=RECTANGULAR\n{','.join(map(short, row))}\n"
-            yield _set(one, model.faces[mine][which.ravel() == a], "ELSET")
+            yield _set(one, model.faces[mine][those], "ELSET")
             yield f"*{section} SECTION, ELSET={one}, MATERIAL=PATCH_{k}, ORIENTATION={one}\n{thickness}\n"
     yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k + 1},\n" for k in np.unique(patch_of))
     for k, (cable, area, material, numbers, _) in enumerate(model.cable_edges(), 1):
@@ -125,25 +121,20 @@ def _beams(model: StructuralModel, number: Ints, unit: float) -> Iterator[str]:
     for k, line in enumerate(model.beams, 1):
         elements, first = first + np.arange(len(line.pairs)), first + len(line.pairs)
         width, height, factor = line.member.profile.equal_rectangle
-        yield f"** MEMBER_{k}: {_line(line.name)}\n"
+        yield _comment(f"MEMBER_{k}: {line.name}")
         yield card(f"ELEMENT, TYPE=B31, ELSET=MEMBER_{k}", elements, number[line.pairs])
-        across = bar_axes(X, line.pairs, up)[0][:, 1].round(9) + 0.0
-        rows, which = np.unique(across, axis=0, return_inverse=True)
-        for a, row in enumerate(rows):
-            yield _set(f"MEMBER_{k}_{a + 1}", elements[which.ravel() == a] - 1, "ELSET")
-            yield f"*BEAM SECTION, ELSET=MEMBER_{k}_{a + 1}, MATERIAL=MEMBER_{k}, SECTION=RECT\n"
+        for a, (row, those) in enumerate(_alike(bar_axes(X, line.pairs, up)[0][:, 1]), 1):
+            yield _set(f"MEMBER_{k}_{a}", elements[those] - 1, "ELSET")
+            yield f"*BEAM SECTION, ELSET=MEMBER_{k}_{a}, MATERIAL=MEMBER_{k}, SECTION=RECT\n"
             yield f"{short(width / unit)},{short(height / unit)}\n{','.join(map(short, row))}\n"
         m = line.member.material
-        m = replace(m, young=factor * m.young, density=factor * m.density)
-        yield _material(f"MEMBER_{k}", m, unit)
+        yield _material(f"MEMBER_{k}", replace(m, young=factor * m.young, density=factor * m.density), unit)
 
 
 def _ties(model: StructuralModel, number: Ints) -> Iterator[str]:
-    """What ties the nodes of members to those of the sheets, and holds their ends.
-
-    Where membranes and beams, or shells and cables, share nodes, the constraints that CalculiX makes for
-    them contradict each other from one increment to the next, or it stops with "code 255".
-    """
+    """What ties the nodes of members to those of the sheets, and holds their ends. Where membranes and beams,
+    or shells and cables, share nodes, the constraints that CalculiX makes for them contradict each other from
+    one increment to the next, or it stops with "code 255"."""
     turns = held_turns(model, model.standing.vertices)
     for v, node in zip(model.tied.tolist(), number[model.tied].tolist(), strict=True):
         stops = {0: "123", 1: "23", 2: "1", 3: ""}[model.freedom[v] if model.held[v] else 3]
@@ -182,10 +173,10 @@ def _supports(model: StructuralModel) -> Iterator[str]:
         yield _set(f"SUPPORT_{label}", vertices[held[vertices]])
     if len(fixed):
         yield "*BOUNDARY\nFIXED,1,3\n"
-    alike = np.column_stack([model.axes[sliding].reshape(-1, 9), model.freedom[sliding]]).round(9) + 0.0
-    _, first, which = np.unique(alike, axis=0, return_index=True, return_inverse=True)
-    for k, leader in enumerate(sliding[first], 1):
-        yield _set(f"GUIDE_{k}", sliding[which.ravel() == k - 1])
+    guides = np.column_stack([model.axes[sliding].reshape(-1, 9), model.freedom[sliding]])
+    for k, (_, those) in enumerate(_alike(guides), 1):
+        leader = sliding[those][0]
+        yield _set(f"GUIDE_{k}", sliding[those])
         yield card(f"TRANSFORM, NSET=GUIDE_{k}, TYPE=R", model.axes[leader, :2].reshape(1, 6))
         yield f"*BOUNDARY\nGUIDE_{k},{'1,1' if model.freedom[leader] == 2 else '2,3'}\n"
 
@@ -197,7 +188,7 @@ def _step(model: StructuralModel, step: Step, form: bool, every: bool, unit: flo
         yield "*AMPLITUDE, NAME=WHOLE\n0.,1.,1.,1.\n"
         taken = _released(model, step)
         yield format_rows(f"*AMPLITUDE, NAME=AT_%d_%d\n0.,{FIELD},1.,{FIELD}\n", *taken)
-    yield f"** {_line(step.name)}\n*STEP, NLGEOM, INC=1000\n*STATIC\n"
+    yield f"{_comment(step.name)}*STEP, NLGEOM, INC=1000\n*STATIC\n"
     yield f"{1.0 if form and not released else INCREMENT},1.,{LEAST_INCREMENT},1.\n"
     sets = ("EALL", "CABLES") if model.standing.cables else ("EALL",)
     label, pressures = KINDS[model.elements][2], step.pressures[model.active]
@@ -213,9 +204,8 @@ def _step(model: StructuralModel, step: Step, form: bool, every: bool, unit: flo
         heavy = {"EALL": 1.0} if all(heavy.values()) else heavy
         heavy |= {f"CABLE_{k}": of.density for k, (_, of) in enumerate(model.cable_sections, 1)}
         heavy |= {f"MEMBER_{k}": line.member.material.density for k, line in enumerate(model.beams, 1)}
-        rows += [
-            f"{name},GRAV,{short(step.gravity / unit)},{down}\n" for name, dense in heavy.items() if dense
-        ]
+        pull = f"GRAV,{short(step.gravity / unit)},{down}"
+        rows += [f"{name},{pull}\n" for name, dense in heavy.items() if dense]
     if not rows:  # without a line the loads of the step before would stay
         rows = [f"EALL,{label},0.\n"]
     yield "".join([f"*DLOAD, OP=NEW{', AMPLITUDE=WHOLE' if released else ''}\n", *rows])
@@ -229,10 +219,9 @@ def _step(model: StructuralModel, step: Step, form: bool, every: bool, unit: flo
         yield card(f"CLOAD, {how}", vertex + 1, axis + 1, forces[vertex, axis])
     elif not form:
         yield f"*CLOAD, OP=NEW\n{int(np.flatnonzero(model.nodes)[0]) + 1},1,0.\n"
-    printed = {"NODE PRINT, NSET=NALL": "U"}
-    printed |= {"NODE PRINT, NSET=HELD": "RF"} if model.held.any() else {}
-    printed |= {"NODE PRINT, NSET=ENDS": "RF"} if model.held[model.tied].any() else {}
-    printed |= {f"EL PRINT, ELSET={name}": "S" for name in sets}
+    printed = {"NODE PRINT, NSET=NALL": "U"} | {f"EL PRINT, ELSET={name}": "S" for name in sets}
+    for name, held in (("HELD", model.held), ("ENDS", model.held[model.tied])):
+        printed |= {f"NODE PRINT, NSET={name}": "RF"} if held.any() else {}
     for what, quantity in printed.items():
         yield f"*{what}, GLOBAL=YES, FREQUENCY={1 if every else 1000}\n{quantity}\n"
     if not every:
@@ -242,13 +231,10 @@ def _step(model: StructuralModel, step: Step, form: bool, every: bool, unit: flo
 
 def _released(model: StructuralModel, step: Step) -> tuple[Ints, Ints, Floats, Floats]:
     """The nodes on members, their axes 1 to 3, and the force there when the step begins and ends: at first
-    what keeps the members free of forces, at the end the loads alone.
-
-    The program takes one course in time for each, so that both are one load.
-    """
-    pulls = np.stack([step.forces, forces_on_members(model, step)])
-    end, members = np.einsum("nij,knj->kni", model.axes, pulls)
-    start = end - members
+    what keeps the members free of forces, at the end the loads alone; in one, as the program takes one
+    course in time for each."""
+    pulls = np.stack([step.forces, step.forces - forces_on_members(model, step)])
+    end, start = np.einsum("nij,knj->kni", model.axes, pulls)
     vertex, axis = np.nonzero(((start != 0.0) | (end != 0.0)) & (model.nodes & model.on_members)[:, None])
     return vertex + 1, axis + 1, start[vertex, axis], end[vertex, axis]
 
@@ -259,9 +245,19 @@ def card(head: str, *columns: Ints | Floats) -> str:
     >>> card("NODE", np.array([7]), np.array([[0.5, -1.0]]))
     '*NODE\\n7,5.000000000000e-01,-1.000000000000e+00\\n'
     """
+    return f"*{head}\n{_rows(*columns)}"
+
+
+def _rows(*columns: Ints | Floats) -> str:
     parts = [part for column in columns for part in np.reshape(column, (len(column), -1)).T]
     row = ",".join("%d" if part.dtype.kind == "i" else FIELD for part in parts)
-    return f"*{head}\n" + format_rows(f"{row}\n", *parts)
+    return format_rows(f"{row}\n", *parts)
+
+
+def _alike(values: Floats) -> Iterator[tuple[Floats, Bools]]:
+    """The different rows of values (k,c), to rounding, and which rows (k,) are so."""
+    rows, which = np.unique(values.round(9) + 0.0, axis=0, return_inverse=True)
+    return ((row, which.ravel() == k) for k, row in enumerate(rows))
 
 
 def _set(name: str, members: Ints, kind: str = "NSET") -> str:
@@ -280,5 +276,5 @@ def short(value: float) -> str:
     return f"{value:.12g}"
 
 
-def _line(text: str) -> str:
-    return " ".join(text.split())[:LONGEST]
+def _comment(text: str) -> str:
+    return f"** {' '.join(text.split())[:LONGEST]}\n"

@@ -33,12 +33,11 @@ class Step:
 
     def plus(self, last: Step, first: Step, factor: float) -> Step:
         """This step and ``factor`` times what ``last`` has more than ``first``: loads add up."""
-        return replace(
-            self,
-            pressures=self.pressures + factor * (last.pressures - first.pressures),
-            forces=self.forces + factor * (last.forces - first.forces),
-            gravity=self.gravity + factor * (last.gravity - first.gravity),
-        )
+        sums: list[Any] = []
+        for name in ("pressures", "forces", "gravity"):
+            own, end, begin = (getattr(step, name) for step in (self, last, first))
+            sums.append(own + factor * (end - begin))
+        return Step(self.name, *sums)
 
 
 @dataclass(frozen=True)
@@ -60,15 +59,13 @@ class SelfWeight:
 
 @dataclass(frozen=True)
 class Snow:
-    """A load per plan area, against Π's normal, besides the snow that the form was found under.
-
-    It keeps its size and direction while the surface deforms.
-    """
+    """A load per plan area, against Π's normal, besides the snow that the form was found under. It keeps its
+    size and direction while the surface deforms."""
 
     load: float  # s, force per area of the plan; negative for a lift
     patches: Sequence[str] = ()  # names of those that carry it; by default all ``in_the_open``
     name: str = "snow"  # of its step
-    slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it lies where the slope is between these
+    slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it lies on slopes over the first, up to the second
     area: Sequence[Sequence[float]] = ()  # points [x, y] of Π: it lies in their polygon; empty: everywhere
     slides: Sequence[float] = ()  # degrees: whole up to the first slope, none from the second, linear between
 
@@ -98,25 +95,22 @@ class Snow:
 
 @dataclass(frozen=True)
 class Wind:
-    """Pressures of wind zones, which are patches. They add to the patches' own pressures.
-
-    They act along the patch's positive normal as ``Patch.pressure``, above 0 for suction on a roof, and
-    follow it while the surface deforms.
-    """
+    """Pressures of wind zones, which are patches, added to the patches' own: along the patch's positive
+    normal as ``Patch.pressure``, above 0 for suction on a roof; they follow it while the surface deforms."""
 
     pressures: Mapping[str, float]  # force per area by patch name
     name: str = "wind"  # of its step
-    slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it acts where the slope is between these
+    slopes: Sequence[float] = (0.0, STEEPEST)  # degrees: it acts on slopes over the first, up to the second
     area: Sequence[Sequence[float]] = ()  # points [x, y] of Π: it acts in their polygon; empty: everywhere
 
     def __post_init__(self) -> None:
         if not isinstance(self.pressures, Mapping) or not self.pressures:
             expected = "pressures by patch name, such as {'roof': 0.5}"
             validate.refuse("Wind.pressures", self.pressures, expected)
-        checked = {
-            zone: validate.number("Wind.pressures", value, least=-LARGEST, most=LARGEST, where=str(zone))
-            for zone, value in self.pressures.items()
-        }
+        checked: dict[str, float] = {}
+        limits: dict[str, Any] = {"least": -LARGEST, "most": LARGEST}
+        for zone, value in self.pressures.items():
+            checked[zone] = validate.number("Wind.pressures", value, where=str(zone), **limits)
         vars(self).update(pressures=checked, **_checked_zone("Wind", self))
         validate.checked_name("name of a load", self.name)
 
@@ -126,9 +120,8 @@ class Wind:
 
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
         by_patch = np.zeros(len(surface.patches))
-        for zone, value in self.pressures.items():
-            by_patch[surface.patch_index(zone)] = value
-        more = np.where(_in_zone(self, surface), by_patch[surface.patch_of_face], 0.0)
+        by_patch[[surface.patch_index(zone) for zone in self.pressures]] = [*self.pressures.values()]
+        more = _in_zone(self, surface) * by_patch[surface.patch_of_face]
         return replace(step, pressures=step.pressures + more)
 
 
@@ -142,12 +135,10 @@ def load_steps(
     combinations: Mapping[str, Mapping[str, float]] | None = None,
 ) -> tuple[Step, ...]:
     """The form-finding load first, then a step for each load, and one for each combination; loads in one
-    tuple act together.
+    tuple act together. ``gravity`` is that of self-weight where it has none of its own, length/time².
 
     A combination is Σ f L of the loads L of the steps that it names, with their factors f. The form-finding
     load and self-weight act in it with the factor 1 where it does not name them.
-
-    ``gravity`` is that of self-weight where it has none of its own, length/time².
 
     >>> from pcmc import Patch
     >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
@@ -167,21 +158,22 @@ def load_steps(
     np.add.at(weight, ends, per_edge[:, None, None] * downwards)
     name = "form pressure less snow" if surface.snows.any() else "form pressure"
     form = permanent = Step(name, surface.net_pressures[surface.patch_of_face], weight)
-    steps, added, weights = [form], {FORM: (form, nothing(form))}, dict[str, float]()
+    steps, added = [form], {FORM: (form, nothing(form))}
     for together in map(acting_together, loads):
         step = replace(permanent, name=step_name(together))
         for load in together:
             step = load.added_to(step, surface, gravity)
         steps.append(step)
         added[step.name] = step, permanent
-        weights[step.name] = step.gravity - permanent.gravity
         permanent = replace(permanent, gravity=step.gravity)
     for name, factors in (combinations or {}).items():
         sum_ = replace(nothing(form), name=name)
-        for case, factor in ({FORM: 1.0} | dict(factors)).items():
-            sum_ = sum_.plus(*added[case], factor)
-        others = sum(weight for case, weight in weights.items() if case not in factors)
-        steps.append(replace(sum_, gravity=sum_.gravity + others))
+        for case, (last, first) in added.items():
+            if case in factors or case == FORM:
+                sum_ = sum_.plus(last, first, factors.get(case, 1.0))
+            else:
+                sum_ = replace(sum_, gravity=sum_.gravity + last.gravity - first.gravity)
+        steps.append(sum_)
     return tuple(steps)
 
 
@@ -192,7 +184,7 @@ def nothing(step: Step) -> Step:
 
 def acting_together(entry: Load | Sequence[Load]) -> tuple[Load, ...]:
     """The loads of one step: those of a tuple, or a single one."""
-    return entry if isinstance(entry, tuple) else (entry,)
+    return entry if isinstance(entry, tuple) and entry else (entry,)
 
 
 def step_name(together: Sequence[Load]) -> str:
@@ -202,15 +194,15 @@ def step_name(together: Sequence[Load]) -> str:
 
 def check_loads(
     loads: object, surface: Surface, replaced: Sequence[str] = ()
-) -> tuple[Load | tuple[Load, ...], ...]:
-    """Loads, or tuples of them, whose patches are there; none on walls ``replaced`` by members, and none that
+) -> tuple[tuple[Load, ...], ...]:
+    """The loads of each step, whose patches are there; none on walls ``replaced`` by members, and none that
     acts downwards beside mirror planes that lean."""
     expected = "a sequence of SelfWeight, Snow or Wind, or of tuples of these"
     if isinstance(loads, Load) or not isinstance(loads, Sequence):
         validate.refuse("loads", loads, expected)
     leaning = leaning_mirrors(surface.plane, surface.on_planes)
     for entry in loads:
-        for load in entry if isinstance(entry, tuple) and entry else (entry,):
+        for load in acting_together(entry):
             if not isinstance(load, Load):
                 validate.refuse("loads", load, expected)
             if leaning and not isinstance(load, Wind):
@@ -221,41 +213,40 @@ def check_loads(
                 if name in replaced:
                     text = f"{load.name}: a member stands in the place of {name!r}, so no load acts on it"
                     raise OptionError(f"{text}; leave it out", what="loads", where=name)
-    return tuple(loads)
+    return tuple(map(acting_together, loads))
 
 
 def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) -> dict[str, dict[str, float]]:
     """Factors by the names of steps, by the name of each combination; every step named is there."""
-    steps = [step_name(acting_together(entry)) for entry in loads]
+    cases = [FORM, *(step_name(acting_together(entry)) for entry in loads)]
     if not isinstance(given, Mapping):
         validate.refuse("combinations", given, "factors by name, such as {'uls': {'snow': 1.5}}")
-    for name in set(steps) if given else ():
-        if steps.count(name) > 1 or name == FORM:
-            text = f"combinations: two cases are called {name!r}; give each a name of its own"
-            raise OptionError(text, what="combinations", found=name)
+    if given and len(set(cases)) < len(cases):
+        name = next(name for name in cases if cases.count(name) > 1)
+        text = f"combinations: two cases are called {name!r}; give each a name of its own"
+        raise OptionError(text, what="combinations", found=name)
     checked: dict[str, dict[str, float]] = {}
-    limits: dict[str, Any] = {"least": -1e3, "most": 1e3}
     for name, factors in given.items():
         validate.checked_name("name of a combination", name)
-        if name in (*steps, FORM):
+        if name in cases:
             text = f"combination {name!r}: a case has this name; give the combination another one"
             raise OptionError(text, what="combinations", found=name)
         if not isinstance(factors, Mapping) or not factors:
             validate.refuse("combinations", factors, "factors by name, such as {snow = 1.5}", where=name)
         for case in factors:
-            if case not in (FORM, *steps):
-                text = f"combination {name!r}: {unknown('case', case, [FORM, *steps])}"
+            if case not in cases:
+                text = f"combination {name!r}: {unknown('case', case, cases)}"
                 raise OptionError(text, what="combinations", where=name, found=case)
-        checked[name] = {c: validate.number("factor", f, where=c, **limits) for c, f in factors.items()}
+        one = {c: validate.number("factor", f, where=c, least=-1e3, most=1e3) for c, f in factors.items()}
+        checked[name] = one
     return checked
 
 
 def plan_areas(surface: Surface) -> Floats:
     """(m,) the area of each face in the plan, below 0 if it overhangs, length². The side of a patch that
     looks away from Π is the one of the larger part of its plan."""
-    plan = area_vectors(surface.vertices[surface.faces]) @ np.array(surface.plane.normal)
-    side = np.sign(np.bincount(surface.patch_of_face, plan, len(surface.patches)))
-    return np.asarray(plan * side[surface.patch_of_face])
+    plan: Floats = area_vectors(surface.vertices[surface.faces]) @ np.array(surface.plane.normal)
+    return plan * np.sign(np.bincount(surface.patch_of_face, plan))[surface.patch_of_face]
 
 
 def roof_slopes(surface: Surface) -> Floats:
@@ -265,21 +256,37 @@ def roof_slopes(surface: Surface) -> Floats:
 
 
 def _in_zone(load: Snow | Wind, surface: Surface) -> Bools:
-    """(m,) the faces whose slope is a load's, and whose middle is in its area."""
-    least, most = load.slopes
-    slope = roof_slopes(surface)
-    chosen: Bools = (slope >= least - 1e-9) & (slope <= most + 1e-9)
+    """(m,) the faces whose slope is a load's, and whose middle is in its area.
+
+    OptionError where there are none, and for an area that goes on behind a mirror plane, but not as the image
+    of what is in front.
+    """
+    (least, most), slope = load.slopes, roof_slopes(surface)
+    chosen: Bools = ((slope > least + 1e-9) | (least == 0.0)) & (slope <= most + 1e-9)
     if len(load.area):
-        x, y = surface.plane.to_local(surface.vertices[surface.faces].mean(axis=1)).T[:2, :, None]
-        a, b = (corners := np.array(load.area, dtype=float)).T
-        c, d = np.roll(corners, -1, axis=0).T
-        crossed = (b > y) != (d > y)  # (m,k) by the line from the point along x
-        with np.errstate(divide="ignore", invalid="ignore"):
-            chosen &= (crossed & (x < a + (y - b) * (c - a) / (d - b))).sum(axis=1) % 2 == 1
+        middle = surface.vertices[surface.faces].mean(axis=1)
+        here = _within(load.area, surface.plane.to_local(middle))
+        for mirror in (plane for plane, _ in surface.on_planes if plane.mirror):
+            image = middle - 2.0 * mirror.height(middle)[:, None] * np.array(mirror.normal)
+            there = _within(load.area, surface.plane.to_local(image))
+            if there.any() and (there != here).any():
+                text = f"{load.name}: its area goes on behind the {mirror}, and is another one there; let it"
+                text += " end at the mirror, or take the whole roof: --whole, or pcmc.mirrored(surface)"
+                raise OptionError(text, what=load.name)
+        chosen &= here
     if not chosen.any():
         text = f"{load.name}: no triangle has its middle in the area and its slope in {[least, most]}"
         raise OptionError(f"{text}; check the zone", what=load.name)
     return chosen
+
+
+def _within(area: Sequence[Sequence[float]], places: Floats) -> Bools:
+    """(m,) the places (m,3), in the coordinates of Π, that are within a polygon."""
+    x, y = places.T[:2, :, None]
+    (a, b), (c, d) = (np.roll(np.array(area), -k, axis=0).T for k in (0, 1))
+    crossed = (b > y) != (d > y)  # (m,k) by the line from the place along x
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray((crossed & (x < a + (y - b) * (c - a) / (d - b))).sum(axis=1) % 2 == 1)
 
 
 def _checked_zone(kind: str, load: Snow | Wind) -> dict[str, Any]:
@@ -291,8 +298,8 @@ def _checked_zone(kind: str, load: Snow | Wind) -> dict[str, Any]:
         good = False
     if not (good and np.isfinite(points).all()):
         validate.refuse(f"{kind}.area", load.area, "three or more points [x, y]")
-    slopes = _checked_slopes(f"{kind}.slopes", load.slopes)
-    return {"slopes": slopes, "area": tuple(map(tuple, points.tolist()))}
+    area = tuple(map(tuple, points.tolist()))
+    return {"slopes": _checked_slopes(f"{kind}.slopes", load.slopes), "area": area}
 
 
 def _checked_slopes(what: str, given: Any) -> tuple[float, float]:

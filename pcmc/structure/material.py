@@ -11,6 +11,8 @@ from ..base import validate
 from ..base.errors import OptionError
 from ..surface.checks import LARGEST, SMALLEST
 
+STIFF: dict[str, Any] = {"least": SMALLEST, "most": LARGEST}  # limits of stiffnesses and sizes
+
 
 @dataclass(frozen=True)
 class Material:
@@ -38,14 +40,13 @@ class Material:
     warp: Sequence[float] = (1.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        most: dict[str, Any] = {"most": LARGEST}
-        stiff = {"least": SMALLEST, **most}
-        limits = {"young": stiff, "poisson": {"least": 0.0, "below": 0.5}, "density": {"least": 0.0, **most}}
         if (self.weft is None) != (self.shear is None):
             missing = "shear" if self.shear is None else "weft"
             text = f"Material.{missing} is missing: a cloth needs young, weft and shear"
             raise OptionError(text, what=f"Material.{missing}")
-        for name, bounds in (limits | ({"weft": stiff, "shear": stiff} if self.cloth else {})).items():
+        limits: dict[str, Any] = dict.fromkeys(("young", *(("weft", "shear") * self.cloth)), STIFF)
+        limits |= {"poisson": {"least": 0.0, "below": 0.5}, "density": {"least": 0.0, "most": LARGEST}}
+        for name, bounds in limits.items():
             vars(self)[name] = validate.number(f"Material.{name}", getattr(self, name), **bounds)
         if self.weft is not None and self.poisson**2 * self.weft >= self.young:
             text = f"Material.weft: expected less than young/poisson² = {self.young / self.poisson**2:.4g}"
@@ -82,10 +83,9 @@ class Profile:
     sizes: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        limits: dict[str, Any] = {"least": SMALLEST, "most": LARGEST}
         for name in ("area", "upright", "sideways"):
             value = self.upright if getattr(self, name) is None else getattr(self, name)
-            vars(self)[name] = validate.number(f"Profile.{name}", value, **limits)
+            vars(self)[name] = _size(name, value)
 
     @classmethod
     def rectangle(cls, width: float, height: float) -> Profile:
@@ -148,11 +148,10 @@ class Profile:
     def torsion(self) -> float:
         """J of the equal rectangle, length⁴: c a³ b with its shorter side a and c = 1/3 - 0.21 a/b
         (1 - a⁴/12 b⁴), as in Roark's Formulas for Stress and Strain."""
-        b, h, factor = self.equal_rectangle
-        short, long = sorted((b, h))
-        q = short / long
-        return factor * short**3 * long * (1.0 / 3.0 - 0.21 * q * (1.0 - q**4 / 12.0))
+        *sides, factor = self.equal_rectangle
+        a, b = sorted(sides)
+        return factor * a**3 * b * (1.0 / 3.0 - 0.21 * a / b * (1.0 - (a / b) ** 4 / 12.0))
 
 
 def _size(name: str, value: object) -> float:
-    return validate.number(f"Profile.{name}", value, least=SMALLEST, most=LARGEST)
+    return validate.number(f"Profile.{name}", value, **STIFF)

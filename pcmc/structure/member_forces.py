@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+from scipy.linalg import orth
 from scipy.spatial.distance import pdist
 
 from ..base.arrays import Floats, Ints, cached_array, kept_with_owner
@@ -17,14 +18,13 @@ from ..certificate.supports import FORCE, support_table, support_vertices
 from ..forces.cables import directions, pull_along
 from ..forces.pinching import standing_part
 from ..surface.geometry import lengths_along, vertex_sums
-from .frames import BarFrame
+from .frames import BarFrame, balancing_force, corner_forces, turns
 from .loads import Step
 from .members import PlacedMember
 from .model import StructuralModel
-from .pulls import balancing_force, corner_forces, turns
 from .results import StepResults
 
-COLUMNS = ("N", "V", "V_across", "T", "M", "M_across")  # as ``FrameForces.within`` has them
+COLUMNS = ("s", *"xyz", "N", "V", "V_across", "T", "M", "M_across", "pull", "pull_unbent", "moved")
 ROUNDING = 1e-12  # of the largest force in a member: less of another is none
 ALIKE = 1e-6  # sine of the angle of two directions that are one
 LIMIT = 300.0  # the span over this is the deflection that members are asked to keep
@@ -64,10 +64,9 @@ class MemberForces:
         """The extremes along it: ``least_N`` and ``largest_N``, and the largest shear force ``V`` and moment
         ``M``, in whichever direction; 0 for what is rounding beside the others."""
         N, (V, M) = self.within[:, 0], (np.linalg.norm(self.within[:, k], axis=1) for k in ([1, 2], [4, 5]))
-        found = {"least_N": N.min(), "largest_N": N.max(), "V": V.max(), "M": M.max()}
-        arms = {name: self.span if name == "M" else 1.0 for name in found}
-        least = ROUNDING * max(abs(value) / arms[name] for name, value in found.items())
-        return {name: value if abs(value) > least * arms[name] else 0.0 for name, value in found.items()}
+        found, arms = np.array([N.min(), N.max(), V.max(), M.max()]), np.array([1.0, 1.0, 1.0, self.span])
+        found[np.abs(found / arms) <= ROUNDING * np.abs(found / arms).max()] = 0.0
+        return dict(zip(("least_N", "largest_N", "V", "M"), found.tolist(), strict=True))
 
     @property
     def balance(self) -> tuple[float, float]:
@@ -78,14 +77,12 @@ class MemberForces:
     def wall_tensions(self) -> Floats:
         """(k,2) force/length: the pull of the sheets, which a wall balances by its tension; and what it
         would balance, free along a line that does not bend: N κ, N of ``balance``. NaN at ends."""
-        P, closed = self.points, self.line.closed
+        P, size = self.points, np.linalg.norm(self.pulls, axis=1)
         edges = np.linalg.norm(np.diff(P, axis=0, append=P[:1]), axis=1)
-        size = np.linalg.norm(self.pulls, axis=1)
-        along = self.pulls / np.where(size > 0.0, size, 1.0)[:, None]
-        needed = -self.balance[0] * (turns(P, closed) * along).sum(axis=1)
-        found = np.stack([size, needed], axis=1) / (0.5 * (edges + np.roll(edges, 1)))[:, None]
-        if not closed:
-            found[[0, -1]] = np.nan
+        across = (turns(P, self.line.closed) * self.pulls).sum(axis=1) / np.where(size > 0.0, size, 1.0)
+        found = np.stack([size, -self.balance[0] * across], axis=1)
+        found /= (0.5 * (edges + np.roll(edges, 1)))[:, None]
+        found[[] if self.line.closed else [0, -1]] = np.nan
         return found
 
     @property
@@ -115,10 +112,9 @@ def members_in(
         moved[vertices] = solved.displacements
     found, first = list[MemberForces](), 0
     for line in model.beams:
-        v, bars = line.vertices, first + np.arange(len(line.pairs))
-        within, N = solved.within(bars, line.closed), np.zeros(len(frame.bars))
+        v, bars, N = line.vertices, first + np.arange(len(line.pairs)), np.zeros(len(frame.bars))
         N[bars] = 0.5 * (solved.ends[bars, 6] - solved.ends[bars, 0])
-        buckling = frame.buckling(N)
+        within, buckling = solved.within(bars, line.closed), frame.buckling(N)
         found.append(MemberForces(line, X[v], within, moved[v], forces[v], buckling))
         first += len(bars)
     return tuple(found)
@@ -126,24 +122,20 @@ def members_in(
 
 def forces_on_members(model: StructuralModel, step: Step, found: StepResults | None = None) -> Floats:
     """(n,3) the forces of sheets, cables and loads on the vertices under a step: on members what they carry,
-    nothing at other vertices that no support holds.
-
-    ``found`` has the stresses and displacements; without it the form is at rest.
-    """
+    nothing at other vertices that no support holds. Without ``found``, its answer, the form is at rest."""
     s = model.standing
-    X = s.vertices if found is None else s.vertices + np.nan_to_num(found.displacements)
-    faces = s.faces[model.active]
-    if found is None:
-        thickness, tensors = model.thicknesses[s.patch_of_face[model.active]], model.stresses
-    else:
+    X, faces, patch = s.vertices, s.faces[model.active], s.patch_of_face[model.active]
+    thickness, tensors, pulls = model.thicknesses[patch], model.stresses, dict[str, Floats]()
+    if found is not None:
+        X = X + np.nan_to_num(found.displacements)
         thickness, tensors = found.thicknesses[model.faces], found.stresses[model.faces]
+        pulls = dict(found.cable_tensions)
     forces = model.nodal_loads(step, X - s.vertices)
     forces += vertex_sums(corner_forces(X[faces], thickness[:, None, None] * tensors), faces, s.n)
     for cable in s.cables:
-        pull = pull_along(s, cable, cable.edges) if found is None else found.cable_tensions[cable.name]
+        pull = pulls[cable.name] if pulls else pull_along(s, cable, cable.edges)
         along = pull[:, None] * directions(X, cable.edges)[0]
-        for end, sign in ((0, 1.0), (1, -1.0)):
-            np.add.at(forces, cable.edges[:, end], sign * along)
+        np.add.at(forces, cable.edges, np.stack([along, -along], axis=1))
     return forces
 
 
@@ -154,16 +146,15 @@ def frame_of(model: StructuralModel, X: Floats) -> tuple[BarFrame, Ints]:
     place[vertices] = np.arange(len(vertices))
     stiffness = list[list[float]]()
     for line in model.beams:
-        material, profile = line.member.material, line.member.profile
-        E, (up, across) = material.young, profile.moments
-        G = E / (2.0 + 2.0 * material.poisson)
-        stiffness.append([E * profile.area, E * up, E * across, G * profile.torsion])
+        E, profile = line.member.material.young, line.member.profile
+        shear = profile.torsion / (2.0 + 2.0 * line.member.material.poisson)
+        stiffness.append([E * value for value in (profile.area, *profile.moments, shear)])
     of_bars = np.repeat(np.array(stiffness), list(map(len, pairs)), axis=0)
     rows, turns = list[Floats](), held_turns(model, X)
     for v in vertices[model.held[vertices]].tolist():
-        axes = model.axes[v]
-        for kind, stopped in enumerate(((axes, axes[1:], axes[:1])[model.freedom[v]], turns.get(v, ()))):
-            for direction in stopped:
+        stopped = (slice(0, 3), slice(1, 3), slice(0, 1))[model.freedom[v]]
+        for kind, held in enumerate((model.axes[v][stopped], turns.get(v, ()))):
+            for direction in held:
                 row = np.zeros((len(vertices), 2, 3))  # the displacement and the turn of each
                 row[place[v], kind] = direction
                 rows.append(row.ravel())
@@ -181,11 +172,7 @@ def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:
             along = (X[beside] - X[v]) / np.linalg.norm(X[beside] - X[v])
             if model.held[v] and model.freedom[v] == 0:
                 given.setdefault(int(v), []).extend([along] if line.member.ends == "hinged" else np.eye(3))
-    found = {}
-    for v, held in given.items():
-        _, sizes, rows = np.linalg.svd(np.array(held))
-        found[v] = rows[: len(sizes)][sizes > ALIKE]
-    return found
+    return {v: orth(np.array(held).T, ALIKE).T for v, held in given.items()}
 
 
 def supports_with_members(results: StepResults) -> pd.DataFrame:
@@ -197,9 +184,8 @@ def supports_with_members(results: StepResults) -> pd.DataFrame:
     moved = standing.vertices + np.nan_to_num(results.displacements)
     cables = cable_ends(standing, moved, results.cable_tensions)
     for line in model.lines:
-        for v in [] if line.closed else line.vertices[[0, -1]].tolist():
-            if model.held[v]:
-                names.setdefault(v, []).append(line.name)
+        for v in [] if line.closed else line.vertices[[0, -1]][model.held[line.vertices[[0, -1]]]].tolist():
+            names.setdefault(v, []).append(line.name)
     ends = sorted(names)
     alone[ends] = 0.0
     for _, v, force in cables:
@@ -209,35 +195,28 @@ def supports_with_members(results: StepResults) -> pd.DataFrame:
     beside = model.held.copy()
     beside[ends] = False
     there = np.array([beside[on].any() for on in support_vertices(acting).values()], dtype=bool)
-    table = table[there | table[[*FORCE]].any(axis=1) | (not model.lines)]
-    rows = list[list[object]]()
+    table = table[there | table[[*FORCE]].any(axis=1) | (not model.lines)].reset_index(drop=True)
     for k, v in enumerate(ends, 1):
         numbers = 0.0, *standing.vertices[v], *(reactions - alone)[v]
-        rows.append([f"M{k}", " + ".join(names[v]), "member end", *numbers])
-    own = pd.DataFrame(rows, columns=table.columns)
-    return pd.concat([table, own], ignore_index=True) if rows else table.reset_index(drop=True)
+        table.loc[len(table)] = [f"M{k}", " + ".join(names[v]), "member end", *numbers]
+    return table
 
 
 def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tuple[pd.DataFrame, pd.DataFrame]:
     """A row per case and beam: ``least_N`` and ``largest_N``, tension above 0; the largest shear force ``V``
     and moment ``M``, in whichever direction; the largest displacement ``moved``, and ``span_over``, the span
-    over it; ``buckling``, the factor on N at which it buckles, held by no sheets, else NaN. And a
-    row per case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``; ``pull`` and
-    ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``.
-    """
-    rows, along = list[dict[str, object]](), list[pd.DataFrame]()
-    for case, beams in cases:
-        for beam in beams:
-            moved = np.linalg.norm(beam.displacements, axis=1)
-            over = beam.span / moved.max() if moved.any() else np.inf
-            about = {"case": case, "member": beam.line.name}
-            rows.append({**about, **beam.largest, "moved": beam.deflection, "span_over": over})
-            rows[-1]["buckling"] = beam.buckling if beam.buckling < np.inf else np.nan
-            columns = about | {"s": beam.along} | dict(zip("xyz", beam.points.T, strict=True))
-            columns |= dict(zip(COLUMNS, beam.within.T, strict=True))
-            columns |= dict(zip(("pull", "pull_unbent"), beam.wall_tensions.T, strict=True))
-            along.append(pd.DataFrame(columns | {"moved": moved}))
-    return pd.DataFrame(rows), pd.concat(along, ignore_index=True) if along else pd.DataFrame()
+    over it; ``buckling``, the factor on N at which it buckles, held by no sheets, else NaN. And a row per
+    case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``; ``pull`` and
+    ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``."""
+    rows, along = list[dict[str, object]](), [pd.DataFrame()]
+    for case, beam in ((case, beam) for case, beams in cases for beam in beams):
+        about, moved = {"case": case, "member": beam.line.name}, np.linalg.norm(beam.displacements, axis=1)
+        over = beam.span / moved.max() if moved.any() else np.inf
+        rows.append({**about, **beam.largest, "moved": beam.deflection, "span_over": over})
+        rows[-1]["buckling"] = beam.buckling if beam.buckling < np.inf else np.nan
+        columns = [beam.along[:, None], beam.points, beam.within, beam.wall_tensions, moved[:, None]]
+        along.append(pd.DataFrame(about | dict(zip(COLUMNS, np.hstack(columns).T, strict=True))))
+    return pd.DataFrame(rows), pd.concat(along[1:] or along, ignore_index=True)
 
 
 def sentences(model: StructuralModel, units: Units) -> list[str]:
@@ -245,11 +224,10 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
     lines, force, length = list[str](), units.behind("force"), units.behind("length")
     moment = f"{force}·{units.length}" if units else ""
     for beam in members_at_rest(model):
-        N, share = beam.balance
-        most = beam.largest
-        far = most["largest_N"] if most["largest_N"] > -most["least_N"] else most["least_N"]
-        about = f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {most['M']:.3g}{moment}"
-        about += f", M/N = {most['M'] / abs(far):.2g}{length}" if far else ""
+        (N, share), (least, most, _, M) = beam.balance, beam.largest.values()
+        far = most if most > -least else least
+        about = f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {M:.3g}{moment}"
+        about += f", M/N = {M / abs(far):.2g}{length}" if far else ""
         stiff = f"{beam.enough:.3g} times its E A and E I keep the deflection below 1/{LIMIT:.0f} of the span"
         about += f"; {floating(model, beam, units) or f'{stiff} (the member alone)'}"
         about += f"; alone it buckles at {beam.buckling:.3g} times this" if beam.buckling < np.inf else ""
@@ -289,8 +267,7 @@ def slack_cables(table: pd.DataFrame, units: Units) -> list[str]:
 def cable_notes(model: StructuralModel) -> list[str]:
     """That cables are as soft as the cloth, where they have the material of a patch."""
     patches = [replace(material, weft=None, shear=None) for material in model.materials]
-    sections = zip(model.standing.cables, model.cable_sections, strict=True)
-    soft = {cable.name: of.young for cable, (_, of) in sections if of in patches}
+    soft = {cable.name: of.young for cable, _, of, *_ in model.cable_edges() if of in patches}
     if not soft:
         return []
     names = ", ".join(f'"{name}"' for name in soft)
@@ -304,12 +281,12 @@ def cable_offers(model: StructuralModel) -> list[str]:
     shape that does not; none for a thrust, and for a divider with several walls."""
     lines, beams = list[str](), members_at_rest(model)
     for beam in beams:
-        (N, share), on = beam.balance, beam.line.member.on
+        (N, share), on = beam.balance, str(beam.line.member.on)
         alone = sum(other.line.member is beam.line.member for other in beams) == 1
         if beam.line.wall and alone and N > 0.0 and share > STRAIGHT:
             text = f"{on}: with these lines of its divider a cable finds the shape that does not bend:"
             lines += [text, "wall = false", f"cable = {N:.4g}"]
-            lines += [f'name = "{on}"'] if re.fullmatch(r"wall \d+", str(on)) else []
+            lines += [f'name = "{on}"'] * bool(re.fullmatch(r"wall \d+", on))
     return lines
 
 
@@ -331,9 +308,8 @@ def weak_members(
             lines.append(unheld)
             continue
         case, worst = max(own, key=lambda one: one[1].deflection)
-        first = listed[0][1][k]
         inner = slice(None) if rest.line.closed else slice(1, -1)
-        pulls = [np.linalg.norm(beam.pulls[inner], axis=1).sum() for beam in (first, rest)]
+        pulls = [np.linalg.norm(beam.pulls[inner], axis=1).sum() for beam in (own[0][1], rest)]
         share = max(0.0, 1.0 - pulls[0] / pulls[1])
         if worst.enough > 1.0 or (rest.enough > 1.0 and share > HELPED):
             text = f"{rest.line.name} is too weak: under {case} it moves {worst.deflection:.3g}"

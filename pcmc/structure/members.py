@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -80,12 +80,13 @@ class Member:
         validate.choice("Member.kind", self.kind, KINDS)
         validate.choice("Member.ends", self.ends, ENDS)
         validate.flag("Member.propped", self.propped)
-        if self.material.cloth:
-            text = f"member {self.label!r}: its material is a cloth; give it young alone"
-            raise OptionError(text, what="Member.material", where=self.label)
-        if self.propped and not isinstance(self.on, Curve):
-            text = f"member {self.label!r}: propped is for edges of the boundary; leave it out"
-            raise OptionError(text, what="Member.propped", where=self.label)
+        no_curve = self.propped and not isinstance(self.on, Curve)
+        for key, wrong, problem in (
+            ("material", self.material.cloth, "its material is a cloth; give it young alone"),
+            ("propped", no_curve, "propped is for edges of the boundary; leave it out"),
+        ):
+            if wrong:
+                raise OptionError(f"member {self.label!r}: {problem}", what=f"Member.{key}", where=self.label)
 
     @property
     def label(self) -> str:
@@ -138,13 +139,12 @@ class PlacedMember(EdgeCurve):
         ('circle 0.1 m', '-9 kN')
         """
         profile, length = self.member.profile, units.behind("length")
+        ends = " to ".join(dict.fromkeys(f"{N:.4g}" for N in self.forces or ()))
         texts = {"member": self.name, "kind": self.kind, "in the place of": self.wall}
-        texts["section"] = f"{profile.label}{length}" if profile.shape else ""
-        texts["area"] = f"{profile.area:.4g}{units.behind('area')}"
-        texts["Young's modulus"] = f"{self.member.material.young:.4g}{units.behind('pressure')}"
-        texts["length"] = f"{self.length:.4g}{length}"
-        ends = dict.fromkeys(f"{N:.4g}" for N in self.forces or ())
-        texts["N at rest"] = f"{' to '.join(ends)}{units.behind('force')}" if ends else ""
+        texts |= {"section": f"{profile.label}{length}"} if profile.shape else {}
+        texts |= {"area": f"{profile.area:.4g}{units.behind('area')}"}
+        texts |= {"Young's modulus": f"{self.member.material.young:.4g}{units.behind('pressure')}"}
+        texts |= {"length": f"{self.length:.4g}{length}", "N at rest": ends and ends + units.behind("force")}
         return {key: text for key, text in texts.items() if text}
 
 
@@ -160,8 +160,7 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[PlacedMember,
     ('wall 1', 5, False)
     """
     lines, taken = list[PlacedMember](), np.zeros(len(surface.topology.edges), dtype=bool)
-    cut = _mirrored(surface)
-    own = [cable.name for cable in surface.cables]
+    cut, own = _mirrored(surface), [cable.name for cable in surface.cables]
     for member in (one for one in members if not (one.two_points or one.on in own)):
         for line in _lines_of(surface, member):
             edges = surface.topology.edge_numbers(line.pairs)
@@ -176,15 +175,12 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[PlacedMember,
     replaced = {line.wall for line in lines}
     gone = np.array([patch.name in replaced for patch in surface.patches])
     of_edge, patch = surface.topology.edge_of_face, surface.patch_of_face
-    beside = np.zeros((2, len(taken)), dtype=bool)
-    beside[0, of_edge[gone[patch]]] = True
-    beside[1, of_edge[(surface.walls & ~gone)[patch]]] = True
-    shared = beside[0] & beside[1]
-    if shared.any():
-        names = [surface.patches[k].name for k in np.unique(patch[shared[of_edge].any(axis=1)])]
-        one, other = ([name for name in names if (name in replaced) == side] for side in (True, False))
-        text = f"wall {other[0]!r} ends at {one[0]!r}, which has a member; give both one, or none"
-        raise OptionError(text, what="members", where=one[0])
+    ending = (surface.walls & ~gone)[patch]
+    for edge in np.intersect1d(of_edge[gone[patch]], of_edge[ending])[:1]:
+        at = (of_edge == edge).any(axis=1)
+        one, other = (surface.patches[patch[at & side][0]].name for side in (gone[patch], ending))
+        text = f"wall {other!r} ends at {one!r}, which has a member; give both one, or none"
+        raise OptionError(text, what="members", where=one)
     return tuple(lines)
 
 
@@ -214,10 +210,10 @@ def bars_on(
     rim = np.zeros(surface.n, dtype=bool)
     rim[topo.edges[topo.boundary_edge]] = True
     points, near = np.flatnonzero(alone), BESIDE * float(np.median(segment_lengths(X, topo.edges)))
-    times, used = Counter(member.label for member in given), Counter[str]()
-    for member in given:
-        used[member.label] += 1
-        name = member.label if times[member.label] == 1 else f"{member.label}-{used[member.label]}"
+    labels = [member.label for member in given]
+    for k, member in enumerate(given, 1):
+        name = member.label
+        name += f"-{labels[:k].count(name)}" if labels.count(name) > 1 else ""
         top, foot = (to_space(np.array([*p, 0.0]), plane) if len(p) == 2 else p for p in member.two_points)
         away = plane.to_local(X[points]) - plane.to_local(np.array([top]))
         here, at, problem = points[np.hypot(*away[:, :2].T) <= near], point_text(np.array(top)), ""
@@ -245,9 +241,9 @@ def bars_on(
 
 def at_points(bars: Iterable[PlacedMember]) -> dict[int, list[PlacedMember]]:
     """The columns and stays at each vertex."""
-    found = dict[int, list[PlacedMember]]()
+    found = defaultdict[int, list[PlacedMember]](list)
     for bar in bars:
-        found.setdefault(int(bar.vertices[0]), []).append(bar)
+        found[int(bar.vertices[0])].append(bar)
     return found
 
 
@@ -258,26 +254,25 @@ def _mirrored(surface: Surface) -> Bools:
 
 
 def _lines_of(surface: Surface, member: Member) -> Iterator[PlacedMember]:
-    topo, names = surface.topology, [patch.name for patch in surface.patches]
+    """The lines of a member: one for each curve of edges."""
     if isinstance(member.on, Curve):
-        chosen = _along(surface, member.on)
-        found = [("", chosen)]
-        if not chosen.any():
+        found = [("", _along(surface, member.on))]
+        if not found[0][1].any():
             text = f"member {member.label!r}: no edge of the boundary runs along its curve; draw it along one"
             raise OptionError(text, what="members", where=member.label)
     else:
         parts = re.compile(re.escape(str(member.on)) + r"(-\d+)?( \(\d+\))?")
-        walls = [k for k, name in enumerate(names) if parts.fullmatch(name) and surface.walls[k]]
+        every = [(k, surface.patches[k].name) for k in np.flatnonzero(surface.walls).tolist()]
+        walls = [(name, k) for k, name in every if parts.fullmatch(name)]
         if not walls:
-            known = [name for name, wall in zip(names, surface.walls, strict=True) if wall]
-            known += [cable.name for cable in surface.cables]
-            text = unknown("wall or cable", member.on, known)
-            if member.on in names:
+            known = [name for _, name in every]
+            text = unknown("wall or cable", member.on, [*known, *(cable.name for cable in surface.cables)])
+            if member.on in [patch.name for patch in surface.patches]:
                 text = f"{member.on!r} is no wall; it stands in the place of one"
             text = f"member {member.label!r}: {text}; a divider needs a wall to have a member"
             raise OptionError(text, what="members", found=member.on)
-        found = [(names[k], _top(surface, k)) for k in walls]
-    curves = [(wall, curve) for wall, edges in found for curve in topo.curves_among(edges)]
+        found = [(name, _top(surface, k)) for name, k in walls]
+    curves = [(wall, curve) for wall, edges in found for curve in surface.topology.curves_among(edges)]
     for number, (wall, curve) in enumerate(curves, 1):
         name = member.label if len(curves) == 1 else f"{member.label}-{number}"
         about = name, member.kind, member, surface.vertices[curve.vertices], wall
@@ -286,12 +281,10 @@ def _lines_of(surface: Surface, member: Member) -> Iterator[PlacedMember]:
 
 def _top(surface: Surface, wall: int) -> Bools:
     """(e,) the edges of a wall where sheets of the roof meet; OptionError where it rests on Π."""
-    topo = surface.topology
-    own = np.zeros(len(topo.edges), dtype=bool)
-    sheets = topo.edge_of_face[surface.roof[surface.patch_of_face]]
-    mine = surface.patch_of_face == wall
-    own[topo.edge_of_face[mine]] = True
-    top: Bools = own & (np.bincount(sheets.ravel(), minlength=len(topo.edges)) >= 2)
+    topo, mine = surface.topology, surface.patch_of_face == wall
+    roof = topo.edge_of_face[surface.roof[surface.patch_of_face]]
+    sheets = np.bincount(roof.ravel(), minlength=len(topo.edges))
+    top: Bools = np.isin(np.arange(len(topo.edges)), topo.edge_of_face[mine]) & (sheets >= 2)
     name, standing = surface.patches[wall].name, standing_part(surface)
     if not top.any() or (standing.surface.patch_of_face == wall).sum() < mine.sum():
         text = f"member on {name!r}: its junction rests on Π, all or in parts, where it has nothing to carry"
@@ -301,14 +294,11 @@ def _top(surface: Surface, wall: int) -> Bools:
 
 def _along(surface: Surface, curve: Curve) -> Bools:
     """(e,) the edges of the boundary along a curve, seen along Π's normal."""
-    edges = surface.topology.edges
-    rim = np.flatnonzero(surface.topology.boundary_edge & ~surface.mirror_edge)
-    if not len(rim):
-        return np.zeros(len(edges), dtype=bool)
-    length = segment_lengths(surface.vertices, edges[rim])
-    step = BESIDE * float(length.min())
-    line = curve.local(surface.plane).samples(step)[:, :2]
-    ends = surface.plane.to_local(surface.vertices[edges[rim]])[..., :2]
-    chosen = np.zeros(len(edges), dtype=bool)
-    chosen[rim] = (np.asarray(cKDTree(line).query(ends)[0]) <= step).all(axis=1)
+    chosen = surface.topology.boundary_edge & ~surface.mirror_edge
+    rim = surface.topology.edges[chosen]
+    if len(rim):
+        step = BESIDE * float(segment_lengths(surface.vertices, rim).min())
+        line = curve.local(surface.plane).samples(step)[:, :2]
+        ends = surface.plane.to_local(surface.vertices[rim])[..., :2]
+        chosen[chosen] = (np.asarray(cKDTree(line).query(ends)[0]) <= step).all(axis=1)
     return chosen

@@ -23,20 +23,11 @@ from ..surface.geometry import area_vectors, face_areas, segment_lengths, unit_v
 from ..surface.lagrange import expect_flat
 from ..surface.parts import Cable
 from ..surface.supports import apply_supports
+from .frames import balancing_force, corner_forces, in_planes
 from .gas import Gas
-from .loads import (
-    GRAVITY,
-    Load,
-    SelfWeight,
-    Step,
-    acting_together,
-    check_combinations,
-    check_loads,
-    load_steps,
-)
+from .loads import GRAVITY, Load, SelfWeight, Step, check_combinations, check_loads, load_steps
 from .material import Material
 from .members import WHOLE, Member, PlacedMember, bars_on, lines_on
-from .pulls import balancing_force, corner_forces, in_planes
 
 ACROSS = 1e-3  # of a direction: a shorter projection gives no warp
 THINNEST = 1e-9  # a thickness, in the size of the surface: thinner ones overflow the stresses
@@ -49,8 +40,7 @@ class StructuralModel:
     Parameters
     ----------
     surface : a certified surface, or the result of a solver.
-    material : of all patches, or one for each, by name.
-    thickness : t > 0, length, or one for each patch, by name.
+    material, thickness : of all patches, or one for each, by name; t > 0, length.
     loads : a step of the analysis for each; a tuple of loads acts in one step. The form-finding pressure is
         the first step and acts in all others, too, as self-weight does once it has come.
     anyway : accept a surface that is not certified; the file's heading then names its verdict.
@@ -58,14 +48,13 @@ class StructuralModel:
         stiff in bending where triangles are much wider than thick: their deflections are too small.
     cable_area : length², of the sections of the surface's cables, or one for each, by name.
     cable_material, certificate : by default those of the patches, and the one of the surface.
-    units : of the numbers: for the file's heading, and for the gravity of ``SelfWeight`` where it is not
-        given. Without a unit of length that takes metres.
-    combinations : sums of the loads with factors: by the name of each combination the factors by the names
-        of the steps, and "form" for the form-finding load, such as {"uls": {"form": 1, "snow": 1.5}}. Each
-        is one more step. The form-finding load and self-weight have the factor 1 where they are not named.
+    units : of the numbers; without a unit of length the gravity of ``SelfWeight`` takes metres.
+    combinations : of each, by name, factors by the names of the steps, and of "form" for the form-finding
+        load, such as {"uls": {"form": 1, "snow": 1.5}}: one more step each. The form-finding load and
+        self-weight have the factor 1 where they are not named.
     gas : what is enclosed and changes its pressure with its volume; see ``Gas``. ``analyse`` finds it.
-    members : beams and cables in the place of walls, along edges, or with a profile for a cable of the
-        surface; see ``Member``. A wall with a member is left out of the model. Columns and stays, too.
+    members : beams and cables in the place of walls, which the model leaves out, along edges, or with a
+        profile for a cable of the surface; columns and stays; see ``Member``.
 
     Raises
     ------
@@ -125,18 +114,17 @@ class StructuralModel:
         vars(self).update(surface=surface, thickness=thickness, members=members)
         vars(self)["loads"] = check_loads(self.loads, surface, [line.wall for line in self.lines])
         vars(self)["combinations"] = check_combinations(self.combinations, self.loads)
-        self.cable_sections, self.bars  # noqa: B018
+        self.bars  # noqa: B018
         of_lines = [line.member.material for line in self.beams] + [of for _, of in self.cable_sections]
         if self.weights and not any(material.density for material in (*self.materials, *of_lines)):
-            hint = "SelfWeight needs it"
-            validate.refuse("Material.density", 0.0, "a finite number > 0", hint=hint)
+            validate.refuse("Material.density", 0.0, "a finite number > 0", hint="SelfWeight needs it")
         known = self.certificate or getattr(solved, "certificate", None)
-        vars(self).update(certificate=certified(surface, self.anyway, known))
+        vars(self)["certificate"] = certified(surface, self.anyway, known)
 
     @property
     def weights(self) -> list[SelfWeight]:
-        single = [load for entry in self.loads for load in acting_together(entry)]
-        return [load for load in single if isinstance(load, SelfWeight)]
+        steps: Any = self.loads  # tuples, once they are checked
+        return [load for together in steps for load in together if isinstance(load, SelfWeight)]
 
     @property
     def note(self) -> str:
@@ -155,17 +143,15 @@ class StructuralModel:
     def warps(self, patch: int) -> Floats:
         """(k,2,3) the directions of warp and weft in the elements of a patch of cloth; OptionError where the
         warp stands across a triangle."""
-        mine = self.active[self.standing.patch_of_face[self.active] == patch]
-        P = self.standing.vertices[self.standing.faces[mine]]
-        normal = unit_vectors(area_vectors(P))
-        direction = np.array(self.materials[patch].warp)
+        s = self.standing
+        P = s.vertices[s.faces[self.active[s.patch_of_face[self.active] == patch]]]
+        normal, direction = unit_vectors(area_vectors(P)), np.array(self.materials[patch].warp)
         direction /= np.linalg.norm(direction) or 1.0
         warp = direction - (normal @ direction)[:, None] * normal
         length = np.linalg.norm(warp, axis=1)
         if length.min(initial=1.0) < ACROSS:
-            x, y, z = P[length.argmin()].mean(axis=0)
-            name = self.surface.patches[patch].name
-            text = f"Material.warp: at ({x:.4g}, {y:.4g}, {z:.4g}) {name!r} stands across the direction"
+            at = "({:.4g}, {:.4g}, {:.4g})".format(*P[length.argmin()].mean(axis=0))
+            text = f"Material.warp: at {at} {s.patches[patch].name!r} stands across the direction"
             raise OptionError(f"{text} {list(direction)}; give it another one", what="Material.warp")
         warp /= length[:, None]
         return np.stack([warp, np.cross(normal, warp)], axis=1)
@@ -178,11 +164,9 @@ class StructuralModel:
     @cached_array
     def prestress(self) -> Floats:
         """(e,) the membrane stress of each element under the form-finding load, force/area: α/t, with a
-        weight w per area (α + w z)/t, z the height of the middle above Π, as E = ∫ (α + w z) dA has it.
-        """
-        s = self.standing
-        faces, patch = s.faces[self.active], s.patch_of_face[self.active]
-        return effective_tensions(s, s.vertices, faces, patch) / self.thicknesses[patch]
+        weight w per area (α + w z)/t, z the height of the middle above Π, as E = ∫ (α + w z) dA has it."""
+        s, patch = self.standing, self.standing.patch_of_face[self.active]
+        return effective_tensions(s, s.vertices, s.faces[self.active], patch) / self.thicknesses[patch]
 
     @cached_array
     def stresses(self) -> Floats:
@@ -195,8 +179,8 @@ class StructuralModel:
         """Of each cable of the standing surface the area of its section, length², and its material: those of
         a member, or of all cables, by default the patches' along their warp. A cable in a mirror plane is cut
         in half: it has half its tension, and half its section."""
-        own = {str(member.on): (member.profile.area, member.material) for member in self.members}
-        own |= {line.name: (line.member.profile.area, line.member.material) for line in self.lines}
+        named = {str(one.on): one for one in self.members} | {line.name: line.member for line in self.lines}
+        own = {name: (one.profile.area, one.material) for name, one in named.items()}
         others = checked_areas(self.cable_area, self.surface, without=own)
         usual = self.cable_material or replace(self.materials[0], weft=None, shear=None)
         mirrors = [mask for plane, mask in self.standing.on_planes if plane.mirror]
@@ -207,8 +191,7 @@ class StructuralModel:
     @property
     def cable_areas(self) -> dict[str, float]:
         """Those areas by the names of the cables."""
-        sections = zip(self.standing.cables, self.cable_sections, strict=True)
-        return {cable.name: area for cable, (area, _) in sections}
+        return {cable.name: area for cable, area, *_ in self.cable_edges()}
 
     def cable_edges(self) -> Iterator[tuple[Cable, float, Material, Ints, Floats]]:
         """Each cable, the area of its section, its material, and the numbers (k,) and directions (k,3) of its
@@ -222,7 +205,7 @@ class StructuralModel:
     @cached_array
     def beam_vertices(self) -> Ints:
         """The vertices of beams."""
-        return np.unique(np.concatenate([np.empty((0, 2), dtype=np.int64), *(b.pairs for b in self.beams)]))
+        return np.unique([v for beam in self.beams for v in beam.vertices.tolist()]).astype(np.int64)
 
     @cached_array
     def tied(self) -> Ints:
@@ -281,16 +264,17 @@ class StructuralModel:
     def nodes(self) -> Bools:
         """(n,) the vertices of elements."""
         used = np.zeros(self.surface.n, dtype=bool)
-        used[self.standing.faces[self.active]] = True
-        for ends in (*(cable.edges for cable in self.standing.cables), *(line.pairs for line in self.beams)):
-            used[ends] = True
+        used[self.standing.faces[self.active]] = used[self.beam_vertices] = True
+        used[self.standing.cable_edges.ends] = True
         return used
 
     @cached_array
     def on_members(self) -> Bools:
         """(n,) the vertices that members carry in the place of walls and supports."""
-        vertices = [line.vertices for line in self.lines]
-        return np.isin(np.arange(self.surface.n), np.concatenate([[], *vertices])) & ~self.held
+        on = np.zeros(self.surface.n, dtype=bool)
+        for line in self.lines:
+            on[line.vertices] = True
+        return on & ~self.held
 
     @cached_array
     def freed(self) -> Ints:
@@ -304,7 +288,7 @@ class StructuralModel:
     def allowed(self) -> Floats:
         """(n,3,3) the projection onto the directions in which the supports let each vertex move."""
         columns = [apply_supports(self.standing, np.tile(axis, (self.surface.n, 1))) for axis in np.eye(3)]
-        allowed, up = np.stack(columns, axis=2), np.array(self.surface.plane.normal)
+        allowed, up = np.stack(columns, axis=2), self.surface.plane.normal
         allowed[self.freed == 1] = np.eye(3) - np.outer(up, up)
         allowed[self.freed == 2] = np.eye(3)
         return allowed
@@ -322,8 +306,7 @@ class StructuralModel:
     @cached_array
     def axes(self) -> Floats:
         """(n,3,3) rows: the axes in which supports hold a vertex. On a plane the first is its normal, held;
-        along a line it is the line, and the others are held.
-        """
+        along a line it is the line, and the others are held."""
         axes = np.tile(np.eye(3), (self.surface.n, 1, 1))
         guided = np.flatnonzero(self.held & (self.freedom > 0))
         along = self.allowed[guided]
@@ -341,14 +324,12 @@ class StructuralModel:
 
     def nodal_loads(self, step: Step, displacements: Floats | None = None) -> Floats:
         """(n,3) the loads of a step as forces on the vertices: thirds of triangles', halves of cable edges';
-        ``displacements`` (n,3) turn the pressures with the surface.
-        """
+        ``displacements`` (n,3) turn the pressures with the surface."""
         s, down = self.standing, -np.array(self.standing.plane.normal)
         X = s.vertices if displacements is None else s.vertices + displacements
-        per_face = step.pressures[:, None] * area_vectors(X[s.faces])
         density = np.array([material.density for material in self.materials])
         masses = (density * self.thicknesses)[s.patch_of_face] * face_areas(s.vertices[s.faces])
-        per_face += step.gravity * masses[:, None] * down
+        per_face = step.pressures[:, None] * area_vectors(X[s.faces]) + step.gravity * masses[:, None] * down
         forces = step.forces + vertex_sums(per_face[self.active] / 3.0, s.faces[self.active], s.n)
         lengths = [(c.edges, area * of.density) for c, area, of, *_ in self.cable_edges()]
         lengths += [(b.pairs, b.member.profile.area * b.member.material.density) for b in self.beams]
@@ -376,18 +357,17 @@ def checked_thickness(given: object, surface: Surface) -> float | dict[str, floa
 def checked_areas(given: object, surface: Surface, without: Container[str] = ()) -> dict[str, float]:
     """The area of each cable's section by name, from one number or one by name; not of those ``without``."""
     limits: dict[str, Any] = {"least": (THINNEST * surface.size) ** 2, "most": surface.size**2}
-    wanting = [cable for cable in surface.cables if cable.name not in without]
+    wanting = [cable.name for cable in surface.cables if cable.name not in without]
     if given is None and wanting:
-        name = wanting[0].name
-        message = f"cable_area is missing: give the area of the section of cable {name!r}, length²"
-        raise OptionError(message, what="cable_area", where=name)
+        text = f"cable_area is missing: give the area of the section of cable {wanting[0]!r}, length²"
+        raise OptionError(text, what="cable_area", where=wanting[0])
     if given is not None and not isinstance(given, Mapping):
         validate.number("cable_area", given, **limits)
         if not wanting:
             text = "cable_area: no cable of the surface needs it; leave it out"
             raise OptionError(text, what="cable_area", found=given)
-    areas = [(name, area) for name, area in _each(given, surface.cables, "cable") if name not in without]
-    return {name: validate.number("cable_area", area, where=name, **limits) for name, area in areas}
+    areas = dict(_each(given, surface.cables, "cable"))
+    return {name: validate.number("cable_area", areas[name], where=name, **limits) for name in wanting}
 
 
 def _each(given: Any, parts: Iterable[Any], kind: str = "") -> list[tuple[str, Any]]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from ..base.arrays import Bools, Floats, Ints, cached_array
 from ..base.errors import FileError, OptionError
@@ -30,7 +31,6 @@ KEYS = {"displacements": 1, "forces": 1, "stresses": 2}  # numbers before the 3,
 POWERS = {"displacements": 1, "forces": 0, "stresses": -2}  # of the unit of length
 SETS = {"CABLES": "cables", "ENDS": "ends"}  # sets of elements and nodes with tables of their own
 OWNERS = {"stresses": "elements", "cables": "cable elements", "forces": "held nodes"}  # of others nodes
-TENSOR = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]  # where a tensor's entries are in xx, yy, zz, xy, xz, yz
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +75,10 @@ class StepResults:
         """
         model, standing = self.model, self.model.standing
         faces, patch = standing.faces[model.active], standing.patch_of_face[model.active]
-        before, after = (P[:, 1:] - P[:, :1] for P in (standing.vertices[faces], self._corners))
-        metric, stretched = before @ before.swapaxes(1, 2), after @ after.swapaxes(1, 2)
+        both = (P[:, 1:] - P[:, :1] for P in (standing.vertices[faces], self._corners))
+        metrics = [edges @ edges.swapaxes(1, 2) for edges in both]
         thinner = [0.0 if of.cloth else of.poisson / (1.0 - of.poisson) for of in model.materials]
-        growth = np.trace(np.linalg.solve(metric, stretched), axis1=1, axis2=2) - 2.0
+        growth = np.trace(np.linalg.solve(*metrics), axis1=1, axis2=2) - 2.0
         values, left = model.thicknesses[model.surface.patch_of_face], 1.0 - np.array(thinner)[patch] * growth
         _check_strain(self.step, f"patch {model.surface.patches[patch[left.argmin()]].name!r}", left)
         values[model.faces] *= np.sqrt(left)
@@ -126,8 +126,7 @@ def read_steps(
 ) -> tuple[StepResults, ...]:
     """The same for other ``steps`` of the model. Where the program stopped, the last results are those of the
     ``share`` of the step that it reached; steps that it did not begin are left out. A length of 1 in the file
-    is ``unit`` in the model.
-    """
+    is ``unit`` in the model."""
     check_regular(path)
     suffix_of(path, (".dat",), "a result of CalculiX")
     try:
@@ -146,7 +145,7 @@ def read_steps(
 def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list[Tables]) -> StepResults:
     """The arrays of step k on the surface's vertices and faces; only the standing faces are elements."""
     blocks = {kind: of_increments[-1] for kind, of_increments in tables[k].items()}
-    step, surface, stress = steps[k], model.standing, blocks["stresses"]
+    step, surface = steps[k], model.standing
     share = blocks["displacements"].time - k
     if share < 1.0 - WHOLE:
         before = steps[k - 1] if k else nothing(step)
@@ -161,10 +160,10 @@ def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list
         reactions[~model.held] = 0.0
         reactions -= np.einsum("nij,nj->ni", model.allowed, reactions)
     stresses = np.full((model.surface.m, 3, 3), np.nan)
-    stresses[model.faces] = stress.means(model.faces + 1)[:, TENSOR]
+    stresses[model.faces] = blocks["stresses"].tensors(model.faces + 1)
     tensions, moved = {}, surface.vertices + displacements
     for cable, area, of, numbers, _ in model.cable_edges() if "cables" in blocks else ():
-        mine, along = blocks["cables"].means(numbers)[:, TENSOR], directions(moved, cable.edges)[0]
+        mine, along = blocks["cables"].tensors(numbers), directions(moved, cable.edges)[0]
         stretch = segment_lengths(moved, cable.edges) / segment_lengths(surface.vertices, cable.edges)
         left = 1.0 - of.poisson * (stretch**2 - 1.0)  # of its section, as far as it is drawn in
         _check_strain(step, f"cable {cable.name!r}", left)
@@ -184,24 +183,23 @@ def _check_strain(step: Step, what: str, left: Floats) -> None:
 def _taut(model: StructuralModel, k: int, tables: list[Tables]) -> float:
     """The time in step k at which the first face gets slack, by lines through the least principal stress at
     the increments, from the end of the step before on; 1 if none does."""
-    places, faces = np.full((model.surface.n, 3), np.nan), model.standing.faces[model.active]
+    X, F = model.standing.vertices.copy(), model.standing.faces[model.active]
+    before = tables[k - 1] if k else {}
+    both = [before.get(kind, [])[-1:] + tables[k][kind] for kind in ("displacements", "stresses")]
     least = [] if k else [(0.0, float(model.prestress.min()))]
-    last = {kind: blocks[-1:] for kind, blocks in tables[k - 1].items()} if k else {}
-    both = [last.get(kind, []) + tables[k][kind] for kind in ("displacements", "stresses")]
     for moved, block in zip(*both, strict=True):
-        places[moved.ids - 1] = model.standing.vertices[moved.ids - 1] + moved.values
-        stresses = block.means(model.faces + 1)[:, TENSOR]
-        least.append((block.time - k, float(_in_planes(places[faces], stresses).min())))
-    for (time, before), (end, after) in pairwise(least):
+        X[moved.ids - 1] = model.standing.vertices[moved.ids - 1] + moved.values
+        least.append((block.time - k, float(_in_planes(X[F], block.tensors(model.faces + 1)).min())))
+    for (time, start), (end, after) in pairwise(least):
         if after <= 0.0:
-            return time + (end - time) * before / (before - after) if before > 0.0 else time
+            return time + (end - time) * start / (start - after) if start > 0.0 else time
     return 1.0
 
 
 def _in_planes(P: Floats, stresses: Floats) -> Floats:
     """(k,2) the principal values, ascending, of tensors (k,3,3) in the planes of triangles (k,3,3)."""
-    first = unit_vectors(P[:, 1] - P[:, 0])
-    plane = np.stack([first, np.cross(unit_vectors(area_vectors(P)), first)], axis=1)
+    first, normal = unit_vectors(P[:, 1] - P[:, 0]), unit_vectors(area_vectors(P))
+    plane = np.stack([first, np.cross(normal, first)], axis=1)
     return np.asarray(np.linalg.eigvalsh(plane @ stresses @ plane.transpose(0, 2, 1)))
 
 
@@ -210,7 +208,6 @@ def _check(tables: list[Tables], model: StructuralModel, steps: Sequence[Step]) 
     nodes, held = (np.flatnonzero(mask) + 1 for mask in (model.nodes, model.held))
     cables = np.array([number for *_, numbers, _ in model.cable_edges() for number in numbers])
     known = {"displacements": nodes, "stresses": model.faces + 1, "forces": held, "cables": cables}
-    known["all forces"] = nodes
     for number, blocks in enumerate(tables[: len(steps)], 1):
         found = {kind: np.unique(of_increments[-1].ids) for kind, of_increments in blocks.items()}
         for kind in ("displacements", "stresses", *["forces"] * bool(len(held))):
@@ -218,7 +215,7 @@ def _check(tables: list[Tables], model: StructuralModel, steps: Sequence[Step]) 
                 text = f"step {number} has no {kind}; run ccx on the model's file again"
                 raise FileError(text, where=number)
         if "forces" in found:
-            found["all forces"] = np.union1d(found["forces"], nodes)
+            known["all forces"], found["all forces"] = nodes, np.union1d(found["forces"], nodes)
             found["forces"] = np.intersect1d(found["forces"], held)
         for kind, numbers in known.items():
             own, what = found.get(kind, numbers), OWNERS.get(kind, "nodes")
@@ -240,17 +237,14 @@ class ResultBlock(NamedTuple):
     ids: Ints  # (k,) numbers of nodes or elements
     values: Floats  # (k,3) vectors, or (k,6) stresses xx, yy, zz, xy, xz, yz
 
-    def means(self, elements: Ints) -> Floats:
-        """(k,c) the mean over the integration points of each of the elements (k,), ascending numbers."""
-        chosen = np.isin(self.ids, elements)
-        place = np.searchsorted(elements, self.ids[chosen])
-        sums = [np.bincount(place, column, len(elements)) for column in self.values[chosen].T]
-        return np.stack(sums, axis=1) / np.bincount(place, minlength=len(elements))[:, None]
+    def tensors(self, elements: Ints) -> Floats:
+        """(k,3,3) the mean over the integration points of each of the elements (k,), ascending numbers."""
+        means = pd.DataFrame(self.values).groupby(self.ids).mean()
+        return means.loc[elements].to_numpy()[:, [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
 
 
 Tables = dict[str, list[ResultBlock]]
-"""Of a step, by quantity: displacements, forces, stresses, the stresses of cables, and the forces at the ends
-of beams; at each of its increments that was printed."""
+"""Of a step, by quantity, at each of its increments that was printed."""
 
 
 def read_tables(text: str, unit: float = 1.0) -> list[Tables]:
@@ -268,7 +262,8 @@ def read_tables(text: str, unit: float = 1.0) -> list[Tables]:
         kind, line = head[1], text.count("\n", 0, head.start()) + 1
         if kind in KEYS:
             body = re.sub(r"[^\S\n]_\S+", "", text[head.end() : end])  # names of local axes
-            rows = _numbers(body.split(), 8 if kind == "stresses" else 4, kind, line)
+            words = EXPONENT.sub(r"E\1", body).split()
+            rows = _numbers(words, 8 if kind == "stresses" else 4, kind, line)
             rows = rows[np.argsort(rows[:, 0], kind="stable")]
             time = float(_numbers([head[4]], 1, "time", line)[0, 0])
             number = max(math.ceil(time - WHOLE), 1)
@@ -283,11 +278,8 @@ def _numbers(words: list[str], columns: int, what: str, line: int) -> Floats:
     """(k,columns) the words of a table; an error names the table and the line where it starts."""
     try:
         values = np.array(words, dtype=float)
-    except ValueError:
-        try:
-            values = np.array([EXPONENT.sub(r"E\1", word) for word in words], dtype=float)
-        except ValueError as error:
-            raise FileError(f"line {line}: the {what} cannot be read ({error})", where=line) from None
+    except ValueError as error:
+        raise FileError(f"line {line}: the {what} cannot be read ({error})", where=line) from None
     if len(values) % columns or not len(values):
         raise FileError(f"line {line}: the {what} are cut off; run ccx again", where=line)
     table = values.reshape(-1, columns)

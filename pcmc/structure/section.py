@@ -42,7 +42,7 @@ class Zone:
     snow : load per plan area, besides the snow that the form was found under.
     wind : pressure, above 0 for suction on a roof.
     patches : that carry it; by default all that are no walls and under no other sheet.
-    slopes : it acts where the slope is between these two, degrees.
+    slopes : it acts on slopes over the first of these and up to the second, degrees; from 0, flat parts, too.
     area : corners [x, y] of a polygon in the plan that it acts within; by default everywhere.
     slides : two slopes, degrees: snow is whole up to the first, none from the second on, linear between.
     """
@@ -116,12 +116,10 @@ class MemberSection:
 
     def profile(self, name: str) -> Profile:
         """Its cross-section; OptionError, with the member's ``name``, where none is given, or two."""
-        sizes = tuple(dict.fromkeys(key for keys in SHAPES for key in keys))
-        given = {key: getattr(self, key) for key in sizes if getattr(self, key) is not None}
+        given = {key: getattr(self, key) for keys in SHAPES for key in keys if getattr(self, key) is not None}
         for keys, make in SHAPES.items():
             if set(keys) == set(given) and (keys != ("area",) or self.kind == "cable"):
-                values = [validate.number(key, given[key], above=0.0, where=name) for key in keys]
-                return make(*values)
+                return make(*(validate.number(key, given[key], above=0.0, where=name) for key in keys))
         wanted = "diameter and thickness, width and height, or area and upright"
         found = " and ".join(given) or "none"
         text = f"member {name!r} has no section: expected {wanted} (of a cable area alone), found {found}"
@@ -132,10 +130,9 @@ class MemberSection:
         if self.young is None:
             text = f"member {name!r} has no material; give it young, Young's modulus"
             raise OptionError(text, what="structure.members", where=name)
-        material = Material(self.young, self.poisson, self.density)
-        propped = self.propped and isinstance(on, Curve)
+        about = self.profile(name), Material(self.young, self.poisson, self.density), self.kind, self.ends
         label = on if isinstance(on, str) else name
-        return Member(on, self.profile(name), material, self.kind, self.ends, propped, label, self.strength)
+        return Member(on, *about, self.propped and isinstance(on, Curve), label, self.strength)
 
     def between(self, name: str, points: Mapping[str, Any]) -> Iterator[Member]:
         """Its columns or stays; ``points`` are those of the plan by name."""
@@ -204,11 +201,9 @@ class Structure:
         if self.gravity is not None and not self._heavy:
             text = "gravity: nothing has a weight; give a density, too, or leave it out"
             raise OptionError(text, what="gravity", found=self.gravity)
-        cloths = [self.weft is not None or "weft" in own for own in self.patches.values()]
-        warped = [own for own, cloth in zip(self.patches.values(), cloths, strict=True) if not cloth]
-        if any("warp" in own for own in warped) or (
-            tuple(self.warp) != Structure.warp and self.weft is None and not any(cloths)
-        ):
+        plain = [own for own in self.patches.values() if self.weft is None and "weft" not in own]
+        no_cloth = self.weft is None and len(plain) == len(self.patches)
+        if any("warp" in own for own in plain) or (no_cloth and tuple(self.warp) != Structure.warp):
             text = "warp: is of a cloth; give its weft and shear, too, or leave it out"
             raise OptionError(text, what="warp")
         check_combinations(self.combinations, self.loads(()))
@@ -233,11 +228,11 @@ class Structure:
 
     def thicknesses(self, surface: Surface) -> float | dict[str, float]:
         """The thickness of all patches, or of each by name."""
-        own = {name: given["thickness"] for name, given in self.patches.items() if "thickness" in given}
-        if own and not isinstance(self.thickness, Mapping):
-            own = dict.fromkeys((patch.name for patch in surface.patches), self.thickness) | own
-        every = self.thickness if isinstance(self.thickness, Mapping) else {}
-        return checked_thickness({**every, **own} if own else self.thickness, surface)
+        own = {key: of["thickness"] for key, of in self.patches.items() if "thickness" in of}
+        every: Any = self.thickness
+        if own and not isinstance(every, Mapping):
+            every = dict.fromkeys((patch.name for patch in surface.patches), every)
+        return checked_thickness({**every, **own} if isinstance(every, Mapping) else every, surface)
 
     @property
     def enclosed(self) -> Gas | None:
@@ -255,14 +250,13 @@ class Structure:
     def loads(self, roof: Sequence[str]) -> tuple[Load | tuple[Load, ...], ...]:
         """Self-weight, snow and wind, each in a step of its own, and the cases of the zones; ``roof`` are the
         names of the patches that wind acts on by default."""
-        weight = [SelfWeight(self.gravity)] if self._heavy else []
-        snow = [Snow(self.snow)] if self.snow != 0.0 else []
-        wind = [Wind(self.wind)] if self.wind else []
-        cases: dict[str, list[Load]] = {}
+        loads: list[Load] = [SelfWeight(self.gravity)] if self._heavy else []
+        loads += [Snow(self.snow)] if self.snow != 0.0 else []
+        loads += [Wind(self.wind)] if self.wind else []
+        cases: dict[str, tuple[Load, ...]] = {}
         for zone in (Zone(**given) for given in self.zones):
-            cases.setdefault(zone.case, []).append(zone.loads(roof or ("roof",)))
-        zoned = [entry[0] if len(entry) == 1 else tuple(entry) for entry in cases.values()]
-        return (*weight, *snow, *wind, *zoned)
+            cases[zone.case] = (*cases.get(zone.case, ()), zone.loads(roof or ("roof",)))
+        return (*loads, *cases.values())
 
     def loads_on(self, surface: Surface) -> tuple[Load | tuple[Load, ...], ...]:
         """The loads on a surface."""
@@ -284,12 +278,10 @@ class Structure:
                 gas["volume"] *= round(whole.m / piece.m)
         values["members"] = {}
         for name, table in self.members.items():  # walls find their images themselves
-            on = [
-                *table.get("on", ()),
-                *(d.name for d in (plan.dividers if plan else ()) if d.member == name),
-            ]
-            more = [new for new, old in ropes.items() if old in on]
-            values["members"][name] = {**table, "on": [*table.get("on", ()), *more]}
+            drawn = [d.name for d in plan.dividers if d.member == name] if plan else []
+            on = table.get("on", ())
+            more = [new for new, old in ropes.items() if old in (*on, *drawn)]
+            values["members"][name] = {**table, "on": [*on, *more]}
         return replace(self, **values)
 
     def check(self, surface: Surface, plan: Plan | None = None, unfold: bool = False) -> None:
@@ -310,11 +302,11 @@ class Structure:
         """The structural model of a surface at rest or of a result, with the members that its ``plan`` names;
         ``about``: ``anyway``, ``certificate`` and ``units``. Errors as of ``pcmc.StructuralModel``."""
         plain: Surface = getattr(surface, "surface", surface)
-        about |= {"combinations": self.combinations, "gas": self.enclosed}
-        about |= {"cable_area": self.cable_area, "members": members_of(self.members, plan)}
+        about |= {"combinations": self.combinations, "gas": self.enclosed, "cable_area": self.cable_area}
         about |= {"cable_material": self.material} if plain.cables else {}
-        cloth = self.materials(plain), self.thicknesses(plain)
-        return StructuralModel(surface, *cloth, self.loads_on(plain), **about)
+        about["members"] = members_of(self.members, plan)
+        of_patches = self.materials(plain), self.thicknesses(plain)
+        return StructuralModel(surface, *of_patches, self.loads_on(plain), **about)
 
 
 def members_of(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> tuple[Member, ...]:
@@ -326,14 +318,13 @@ def members_of(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> tup
     >>> arch.on, arch.profile.sizes
     ('wall 1', (0.1, 0.2))
     """
+    known, members = dict[str, MemberSection](), list[Member]()
     for name, table in given.items():
         check_keys(table, MemberSection, f"structure.members.{name}")
-    known, members = {name: MemberSection(**table) for name, table in given.items()}, list[Member]()
-    for name, section in known.items():
+        section = known[name] = MemberSection(**table)
         section.profile(name)
-        members += [section.member(name, on) for on in section.on]
-        curves = [curve_of(curve, f"member {name!r}") for curve in section.along]
-        members += [section.member(name, curve) for curve in curves]
+        curves = (curve_of(curve, f"member {name!r}") for curve in section.along)
+        members += [section.member(name, on) for on in (*section.on, *curves)]
         members += section.between(name, plan.points) if plan is not None else ()
     sites = list[tuple[str, str, str | Curve]]()  # dividers and holes, their members, and where these are
     for number, divider in enumerate(() if plan is None else plan.dividers, 1):

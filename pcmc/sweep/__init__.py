@@ -1,7 +1,7 @@
 """Sweeps: run a function over a grid of parameters, resumable, on any executor, one row per case.
 
-Gives ``Sweep`` (grid.py), ``run`` (running.py), the store (store.py) and its tables. Workers (workers.py) run
-each case in a process of its own (case_script.py). May import project and all rooms below.
+Gives ``Sweep``, ``run``, the store and its tables. Workers run each case in a process of its own, which loads
+case_script.py. May import project and all rooms below.
 
 >>> import pcmc.sweep
 >>> halves = pcmc.sweep.Sweep("pcmc.sweep.examples:ratio", {"over": [1, 2]}, {"under": 2})

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from concurrent.futures import CancelledError, Executor, Future
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -102,9 +102,9 @@ def run(
             # Ctrl-C comes out of the queue, not in the middle of a write
             stack.enter_context(interrupts_handled(lambda *_: finished.put(None)))
             submit = stack.enter_context(crew.opened(sweep.case))
-            pending = stack.enter_context(_submitted(submit, todo, finished))
-            progress = _progress(records, todo, len(sweep))
-            for futures in _batches(finished, pending):
+            counts = Counter(r.verdict or r.status for n, r in records.items() if n not in todo)
+            before, begin = counts.total(), time.perf_counter()
+            for futures in stack.enter_context(closing(_batches(submit, todo, finished))):
                 new: list[Record] = []
                 try:
                     for future, number in futures:
@@ -115,35 +115,25 @@ def run(
                 records |= {record.case: record for record in new}
                 try:
                     for record in new:
+                        counts[record.verdict or record.status] += 1
+                        done, total = counts.total(), len(sweep)
+                        left = (total - done) * (time.perf_counter() - begin) / (done - before)
                         if on_record is not None:
-                            on_record(progress(record))
+                            on_record(SweepProgress(record, done, total, dict(counts), left))
                 except StopIteration as error:
                     stop_requested(error)
                     break
     return table(records.values())
 
 
-def _progress(
-    records: dict[int, Record], todo: dict[int, Any], total: int
-) -> Callable[[Record], SweepProgress]:
-    """A function that counts a new record and returns the state of the sweep."""
-    counts = Counter(r.verdict or r.status for n, r in records.items() if n not in todo)
-    before, begin = total - len(todo), time.perf_counter()
-
-    def count(record: Record) -> SweepProgress:
-        counts[record.verdict or record.status] += 1
-        done = counts.total()
-        pace = (time.perf_counter() - begin) / (done - before)
-        return SweepProgress(record, done, total, dict(counts), pace * (total - done))
-
-    return count
-
-
-@contextmanager
-def _submitted(
+def _batches(
     submit: Submit, todo: dict[int, dict[str, Any]], finished: SimpleQueue[Any]
-) -> Iterator[dict[Future[dict[str, Any]], int]]:
-    """Submit all cases. Futures that finish come out of ``finished``; at the end the others are cancelled."""
+) -> Generator[list[tuple[Future[dict[str, Any]], int]], None, None]:
+    """Submit all cases; those that come out of ``finished``, with their numbers, until Ctrl-C puts None in.
+
+    A batch is one transaction of the store. It comes at once, but no sooner than PACE after the last. At the
+    end the cases that are left are cancelled.
+    """
     pending: dict[Future[dict[str, Any]], int] = {}
     try:
         for number, parameters in todo.items():
@@ -154,31 +144,21 @@ def _submitted(
                 raise SweepError(text, what="executor") from error
             pending[future] = number
             future.add_done_callback(finished.put)
-        yield pending
+        due, stopped = 0.0, False
+        while pending and not stopped:
+            batch: list[tuple[Future[dict[str, Any]], int]] = []
+            while pending and not stopped and not (batch and time.monotonic() >= due):
+                with suppress(Empty):  # on Windows, Ctrl-C arrives only between two waits
+                    future = finished.get(timeout=max(due - time.monotonic(), 0.0) if batch else PACE)
+                    stopped = future is None
+                    if not stopped:
+                        batch.append((future, pending.pop(future)))
+            if batch:
+                yield batch
+            due = time.monotonic() + PACE
     finally:
         for future in pending:
             future.cancel()
-
-
-def _batches(
-    finished: SimpleQueue[Any], pending: dict[Future[dict[str, Any]], int]
-) -> Iterator[list[tuple[Future[dict[str, Any]], int]]]:
-    """The futures that finish, with their case numbers, until none is pending or Ctrl-C puts None.
-
-    A batch is one transaction of the store. It comes at once, but no sooner than PACE after the last.
-    """
-    due, stopped = 0.0, False
-    while pending and not stopped:
-        batch: list[tuple[Future[dict[str, Any]], int]] = []
-        while pending and not stopped and not (batch and time.monotonic() >= due):
-            with suppress(Empty):  # on Windows, Ctrl-C arrives only between two waits
-                future = finished.get(timeout=max(due - time.monotonic(), 0.0) if batch else PACE)
-                stopped = future is None
-                if not stopped:
-                    batch.append((future, pending.pop(future)))
-        if batch:
-            yield batch
-        due = time.monotonic() + PACE
 
 
 def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:

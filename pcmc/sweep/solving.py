@@ -60,16 +60,9 @@ def _split(
     return build, shape, solver
 
 
-def _check(
-    generator: str,
-    method: str = "newton",
-    mesh_check: bool = False,
-    search: bool = False,
-    generator_digest: str = "",
-    **arguments: Any,
-) -> None:
-    validate.flag("mesh_check", mesh_check)
-    validate.flag("search", search)
+def _check(generator: str, method: str = "newton", generator_digest: str = "", **arguments: Any) -> None:
+    for name in ("mesh_check", "search"):
+        validate.flag(name, arguments.pop(name, False))
     _split(generator, method, arguments)
 
 
@@ -111,8 +104,7 @@ def solve_case(
     ('converged', 58.5059, 17.583)
     """
     build, shape, solver = _split(generator, method, arguments)
-    find = solve if search else solve_once
-    result = find(build(**shape), method, **solver)
+    result = (solve if search else solve_once)(build(**shape), method, **solver)
     answer = case_row(result, arguments)
     if mesh_check:
         from ..project import Outcome  # takes long to import
@@ -155,9 +147,8 @@ def mesh_columns(outcome: Outcome) -> dict[str, Any]:
     if outcome.certificate.index is None:
         return {}
     check = outcome.check_mesh()
-    if check is None:  # the case itself is good without it
-        return {"mesh_verdict": "not checked", "mesh_detail": outcome.mesh_failure}
-    return check.numbers()
+    failed = {"mesh_verdict": "not checked", "mesh_detail": outcome.mesh_failure}  # the case itself is good
+    return failed if check is None else check.numbers()
 
 
 def _tables(certificate: Certificate) -> dict[str, Any]:

@@ -241,17 +241,14 @@ def _records(
         number = int(np.ravel_multi_index(tuple(case.values()), [len(axis) for axis in axes.values()]))
         parameters = {name: axes[name][place] for name, place in case.items()}
         try:
-            if zlib.crc32((key + str(text)).encode()) != crc:
-                raise ValueError
             record = Record(case=number, parameters=parameters, **json.loads(text))
-            words = record.status, record.verdict, record.message
-            tables = record.numbers, record.provenance
-            if {*map(type, words)} != {str} or {*map(type, tables)} != {dict}:
-                raise TypeError
+            words, tables = [getattr(record, word) for word in WORDS], (record.numbers, record.provenance)
+            sound = {*map(type, words)} == {str} and {*map(type, tables)} == {dict}
+            sound = sound and type(record.wall_time) in (int, float)
+            if not sound or zlib.crc32((key + str(text)).encode()) != crc:
+                raise ValueError
             if {*WORDS, "case"} & record.numbers.keys() or {"case", "wall_time"} & record.provenance.keys():
                 raise ValueError
-            if isinstance(record.wall_time, bool) or not isinstance(record.wall_time, int | float):
-                raise TypeError
             answer(record.numbers, parameters)
             records[number] = record
         except (ValueError, TypeError, RecursionError):

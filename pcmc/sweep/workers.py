@@ -35,23 +35,13 @@ GRACE = 2.0  # seconds that a process may exceed its time limit before it is kil
 THREADS = [f"{library}_NUM_THREADS" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA", "NUMEXPR")]
 ONE_THREAD = dict.fromkeys([*THREADS, "VECLIB_MAXIMUM_THREADS", "PCMC_THREADS"], "1")
 SCRIPT = Path(case_script.__file__)
+SIGNALS = {-number: f"signal {number.name}" for number in signal.Signals}  # by exit code
 
 
 def failed_outcome(status: str, message: str, seconds: float, about: dict[str, Any]) -> dict[str, Any]:
     """The fields of a Record, from ``status`` on, of a case that gave no answer."""
     words = {"status": status, "verdict": "", "message": message}
     return {**words, "numbers": {}, "wall_time": seconds, "provenance": about}
-
-
-def _cause(code: int) -> str:
-    """An exit code in words.
-
-    >>> _cause(-9), _cause(3)
-    ('signal SIGKILL', 'exit code 3')
-    """
-    with suppress(ValueError):
-        return f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-    return f"signal {-code}"
 
 
 class Team:
@@ -133,7 +123,9 @@ def run_case(team: str, case: str, parameters: Mapping[str, Any], time_limit: fl
             outcome: dict[str, Any] = process.call(SCRIPT, "answer_case", *task, limit=limit)
             return outcome
         except ChildError as death:
-            status, message = "killed", f"ended its worker process ({_cause(death.code or 0)})"
+            code = death.code or 0
+            cause = SIGNALS.get(code, f"{'signal' if code < 0 else 'exit code'} {abs(code)}")
+            status, message = "killed", f"ended its worker process ({cause})"
             if time_limit is not None and death.seconds >= time_limit:
                 status, message = "timed out", f"stopped at its time limit of {time_limit:g} s"
             about = {"output": death.output, "host": platform.node(), "pid": process.process.pid}
@@ -193,8 +185,7 @@ class Workers:
 def _cluster(team: str, address: str) -> Iterator[Executor]:
     """An executor on the workers of a Dask scheduler."""
     if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]+:\d+/?", address):
-        text = f"scheduler: expected 'tcp://host:8786', found {address!r}"
-        raise OptionError(text, what="scheduler", found=address, expected="tcp://host:8786")
+        validate.refuse("scheduler", address, "'tcp://host:8786'")
     require("distributed", extra="distributed")
     from distributed import Client
 

@@ -30,7 +30,7 @@ def draw_elevations(shapes: Mapping[str, Surface], path: Path, *, top: float) ->
     ranges = [(float(X[:, k].min()), float(X[:, k].max())) for k in (0, 1)]
     widths = [high - low for low, high in ranges]
     figure = new(WIDTH, 180.0 * len(shapes))
-    axes, _ = grid(figure, 2 * len(shapes), 2, width_ratios=widths)
+    axes = grid(figure, 2 * len(shapes), 2, width_ratios=widths)
     for k, (title, surface) in enumerate(shapes.items()):
         for axis, place in enumerate(axes[2 * k : 2 * k + 2]):
             style(place)

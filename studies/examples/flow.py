@@ -11,9 +11,8 @@ import pandas as pd
 
 from pcmc import Surface, curvature_error, gradient, mean_curvature, solve, target_curvature
 from pcmc.base.arrays import Floats, Ints
-from pcmc.forces import triangles
 from pcmc.forces.curvature import METHODS
-from pcmc.forces.functional import patch_areas
+from pcmc.forces.functional import patch_areas, weighted
 from pcmc.meshing.quality import minimum_angle, triangle_quality
 from pcmc.solvers.result import Progress
 
@@ -182,8 +181,7 @@ def conormals(surface: Surface, patch: str) -> Floats:
     """(n,3) area gradient of one patch at every vertex (17a): on its edge the outward co-normal."""
     tension = np.zeros(len(surface.patches))
     tension[surface.patch_index(patch)] = 1.0
-    mesh = triangles.energy_mesh(surface, tension, np.zeros_like(tension))
-    return triangles.totals_and_gradient(mesh, surface.vertices)[2]
+    return weighted(surface, tension)[1]
 
 
 def turn(surface: Surface, vertex: int, patches: tuple[str, str]) -> float:

@@ -156,7 +156,7 @@ def _evolved(surface: Surface, script: str) -> End:
     try:
         commands = f"clock_was := clock\n{script}{SHOW}"
         out = evolver.run(surface, commands, timeout=LONGEST, upright=not surface.rooms)
-        X = evolver.numbers(out, "X", 3) + np.array(surface.plane.point)
+        X = evolver.numbers(out, "X", 3) + surface.origin
     except evolver.EvolverError as error:
         return End(np.nan, None, str(error))
     said = "; ".join(dict.fromkeys(re.findall(r"^(?:WARNING|ERROR).*$", out, re.M)))

@@ -202,7 +202,7 @@ def _bend(case: Case, start: Surface, elements: str, order: int) -> str:
     moves = bent.vertices - flat
     show = '\nforeach vertex vv do printf "V %d %.17g %.17g %.17g\\n", vv.id, vv.x, vv.y, vv.z'
     nodes = evolver.numbers(evolver.run(start, elements + show), "V", 4)
-    away, own = cKDTree(flat - np.array(start.plane.point)).query(nodes[:, 1:])
+    away, own = cKDTree(flat - start.origin).query(nodes[:, 1:])
     assert np.max(away) < 1e-9 * start.size
     text = ""
     for number, move in zip(nodes[:, 0].astype(int), moves[own], strict=True):

@@ -142,7 +142,7 @@ def positions(surface: pcmc.Surface, commands: str, upright: bool = False) -> Fl
     """(n,3) vertices after the commands, which must keep the mesh."""
     show = '\nforeach vertex vv do printf "X %.17g %.17g %.17g\\n", x, y, z'
     out = run(surface, commands + show, upright=upright)
-    return numbers(out, "X", 3) + np.array(surface.plane.point)
+    return numbers(out, "X", 3) + surface.origin
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from pcmc.advice.advice import changes, firmer_walls, flatter, lower_lines
 from pcmc.certificate.diagnosis import describe_saddle
 from pcmc.explore.roof import ShownRoof
 from pcmc.plan import Divider, PatchSpec, Plan
+from pcmc.plan.plan import Chosen
 from pcmc.project import firmer, load, run_project
-from pcmc.project.drawn import Chosen
 
 HALL = "[plan]\nedge_length = 0.8\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
 SEAM = "curve = [[6, 0], [6, 6]]\n"
@@ -325,7 +325,7 @@ def test_a_target_that_needs_a_further_start_is_met(tmp_path, monkeypatch):
         return meet(surface, *args, **options)
 
     tried = []
-    monkeypatch.setattr("pcmc.design.meet", fails_once)
+    monkeypatch.setattr("pcmc.project.solving.meet", fails_once)
     targets = "[targets]\nmeet = [{quantity = 'apex', value = 1.0}]\nvary = ['patch 1']\n"
     outcome = outcome_of(tmp_path, f"{HALL}tension = 5.0\n{targets}")
     assert outcome.good

@@ -171,8 +171,8 @@ def test_sweep(folder, capsys):
 
 def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
     seen = []
-    monkeypatch.setattr("pcmc.explore.start", lambda *given, watch: (*given, watch))
-    monkeypatch.setattr("pcmc.explore.open_and_wait", lambda given, page: seen.append((*given, page)))
+    monkeypatch.setattr("pcmc.cli.files.start", lambda *given, watch: (*given, watch))
+    monkeypatch.setattr("pcmc.cli.files.open_and_wait", lambda given, page: seen.append((*given, page)))
     assert cli.main(["explore", "roof.pcmc", "--no-browser"]) == 0
     assert cli.main(["explore", "--example", "two_squares", "--set", "alpha_aux=1", "--port", "8"]) == 0
     assert cli.main(["explore", "roof.pcmc", "--watch"]) == 0

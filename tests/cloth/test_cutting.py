@@ -14,7 +14,7 @@ from generators import joined_caps, spherical_cap
 from pcmc import Cable, Patch, Surface, cutting_pattern, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.cloth import CuttingOptions
-from pcmc.cloth.flattening import flattened
+from pcmc.cloth.sewing import flattened
 from pcmc.plan import Plan
 
 NONE = np.empty((2, 0, 2), dtype=int)

@@ -14,7 +14,7 @@ import pcmc
 from pcmc.drawings import drawing_set
 from pcmc.drawings.panel_sheets import panel_sheets, triangles_at_true_size
 from pcmc.drawings.sheet import corner, drawing_area
-from pcmc.panelling.flat import packed
+from pcmc.panelling.schedule import packed
 from pcmc.surface.geometry import cross_2d, edge_vectors
 
 

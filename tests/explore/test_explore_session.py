@@ -161,7 +161,7 @@ def test_acts_are_done_in_order_and_none_is_dropped(cap, hall):
     acts = [
         lambda: session.settle({"tensions": {"cap": 0.7}}),
         lambda: session.keep("before"),
-        lambda: session.renew(hall),
+        lambda: session.renew(hall, session.units, session.fallback),
         lambda: session.compare(0),
         lambda: session.settle({"tensions": {"left wall": 11.0}}),
     ]
@@ -273,6 +273,6 @@ def test_another_file_leaves_no_search_behind(cap):
     assert session.visit(1).certificate.verdict is Verdict.SADDLE
     with refused(OptionError, what="number", found=10_000):
         session.visit(10_000)
-    session.renew(cap)
+    session.renew(cap, session.units, session.fallback)
     with refused(OptionError, what="number", found=1):
         session.visit(1)

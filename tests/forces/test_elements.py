@@ -53,15 +53,6 @@ def test_products_are_those_of_the_assembled_matrix():
     np.testing.assert_allclose(change.ravel(), assembled(*ALL) @ d.ravel(), rtol=1e-12, atol=1e-12)
 
 
-def test_elements_times_a_factor_leave_out_those_of_none():
-    whole, part = toy(X), toy(X).times(np.array([2.0, 0.0, 0.5]))
-    np.testing.assert_array_equal(part.vertices, SIX[[0, 2]])
-    np.testing.assert_array_equal(part.value, np.array([2.0, 0.5]) * whole.value[[0, 2]])
-    for one, other in ((part.gradient, whole.gradient), (part.hessian, whole.hessian)):
-        np.testing.assert_array_equal(one()[0], 2.0 * other()[0])
-        np.testing.assert_array_equal(one()[1], 0.5 * other()[2])
-
-
 def test_projected_into_a_motion_space_and_with_a_stiffness():
     rng = np.random.default_rng(5)
     dimension = rng.integers(0, 4, 12)

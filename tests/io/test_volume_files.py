@@ -79,6 +79,7 @@ def test_evolver_has_the_same_volumes_energy_and_gradient(name):
     found = evolver.numbers(out, "V", 2)
     np.testing.assert_allclose(found[:, 0], room_volumes(surface), rtol=1e-12)
     np.testing.assert_allclose(found[:, 1], prescribed_volumes(surface), rtol=1e-12)
+    np.testing.assert_allclose(evolver.positions(surface, ""), surface.vertices, atol=1e-14)
     # its energy leaves out the pressures of bodies whose volume is prescribed
     bare = with_room_pressures(surface, -room_pressures(surface))
     assert evolver.energy(surface) == pytest.approx(pcmc.energy(bare), rel=1e-12)

@@ -77,10 +77,21 @@ def test_errors_of_the_plan_name_the_layer_and_the_entity(tmp_path, case):
     assert f"layer 'divider north': {'LWPOLYLINE' if kind == 'lwpolyline' else 'LINE'}" in str(caught.value)
 
 
+def test_a_tension_counts_in_whichever_text_of_a_patch_it_stands(tmp_path):
+    stated, bare = ("text", "patch", "nave = 7.5"), ("text", "patch", "nave")
+    beside = [("point", "patch nave", (2, 3)), ("line", "divider north", (4, 0), (4, 6))]
+    for calls in ([stated, bare], [stated, *beside]):
+        plan, chosen = proposed(read_drawing(drawing(tmp_path, *calls)))
+        assert {name: patch["tension"] for name, patch in plan["patches"].items()} == {"nave": 7.5}
+        assert not chosen.tensions
+    with refused(PlanError, what="patch", where="nave"):
+        proposed(read_drawing(drawing(tmp_path, stated, ("text", "patch", "nave = 8"))))
+
+
 def test_names_that_do_not_fit_the_drawing_are_refused(tmp_path):
     file = drawing(tmp_path, ("text", "patch", "nave = 7.5"))
     plan = read_drawing(file)
-    assert proposed(plan)["patches"]["nave"]["tension"] == 7.5
+    assert proposed(plan)[0]["patches"]["nave"]["tension"] == 7.5
     with refused(OptionError, what="patches", where="nve"):
         proposed(plan, {"patches": {"nve": {"tension": 1.0}}})
     with refused(OptionError, what="dividers", found="a"):

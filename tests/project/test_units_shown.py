@@ -100,7 +100,7 @@ def test_the_page_shows_the_units_of_mesh_check_and_targets(bubbles):
     session = Session(solved_start(roof), units=METRES)
     targets, vary = (pcmc.Target("apex", value=30.0),), (pcmc.Parameter("cap"),)
     assert "wanted 30 m, " in session.meet(targets, vary).message
-    session.renew(solved_start(roof), Units("ft"))
+    session.renew(solved_start(roof), Units("ft"), session.fallback)
     assert "wanted 30 ft, " in session.meet(targets, vary).message
 
 

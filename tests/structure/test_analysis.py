@@ -17,6 +17,7 @@ from generators.grid import grid_faces
 from pcmc import Material, Patch, Plane, SelfWeight, Snow, Surface, Wind
 from pcmc.plan import Divider, Plan
 from pcmc.structure import analyse, analysis, calculix
+from pcmc.structure.loads import load_steps
 from pcmc.surface.geometry import area_vectors
 from pcmc.surface.pieces import to_space
 
@@ -189,6 +190,19 @@ def test_a_zone_lies_where_the_plan_has_it(plane):
         for s in (film, moved)
     )
     np.testing.assert_allclose(there @ plane.axes.T, here, atol=1e-15)
+
+
+@pytest.mark.parametrize("degrees", [15.0, 30.0, 45.0])
+def test_a_sheet_on_the_slope_between_two_zones_is_in_one(degrees):
+    """A flat side of 30° had the wind of the zones [0, 30] and [30, 90] together; the other side is steep."""
+    z, steep = 2.0 * np.tan(np.radians(degrees)), 3.0
+    X = [[0, 0, 0], [4, 0, 0], [4, 2, z], [0, 2, z], [4, 2 + z / steep, 0], [0, 2 + z / steep, 0]]
+    faces = [[0, 1, 2], [0, 2, 3], [3, 2, 4], [3, 4, 5]]
+    gable = Surface(X, faces, [0] * 4, [Patch("roof", 1.0, 0.0)], fixed=range(6))
+    zones = Wind({"roof": 1.0}, slopes=(0, degrees)), Wind({"roof": 3.0}, slopes=(degrees, 90))
+    assert load_steps(gable, [zones])[1].pressures.tolist() == [1.0, 1.0, 3.0, 3.0]
+    flat = gable.moved(np.array(X) * [1, 1, 0])
+    assert load_steps(flat, [Wind({"roof": 1.0}, slopes=(0, 10))])[1].pressures.tolist() == [1.0] * 4
 
 
 def test_zones_carry_snow_and_wind():

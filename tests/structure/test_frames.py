@@ -6,9 +6,8 @@ from scipy.optimize import brentq
 from structures import scaled
 
 from pcmc.base.errors import OptionError
-from pcmc.structure.frames import BarFrame, bar_axes
+from pcmc.structure.frames import BarFrame, balancing_force, bar_axes
 from pcmc.structure.material import Profile
-from pcmc.structure.pulls import balancing_force
 
 UP = np.array([0.0, 0.0, 1.0])
 PLANAR = [(0, 1), (0, 3), (0, 5)]  # displacements across and turns out of the plane xz, which it keeps

@@ -133,7 +133,7 @@ def test_snow_lies_on_the_upper_sheet_of_a_cushion():
     step = model_of(cushion, loads=[Snow(0.5)], anyway=True).steps[1]
     assert step.forces.sum(axis=0) == pytest.approx([0.0, 0.0, -6.0])
     section = pcmc.project.Structure(young=1.0, thickness=1.0, zones=[{"case": "gust", "wind": 0.2}])
-    assert section.loads_on(cushion)[0].pressures == {"patch 1": 0.2}
+    assert section.loads_on(cushion)[0][0].pressures == {"patch 1": 0.2}
     assert in_the_open(parts()).all()
 
 

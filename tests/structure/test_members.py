@@ -17,13 +17,13 @@ from pcmc.base.units import Units
 from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import Plan, circle, polyline
 from pcmc.structure import Member, Profile, analyse, calculix
+from pcmc.structure.frames import turns
 from pcmc.structure.inp import text_of
 from pcmc.structure.member_forces import (
     member_tables,
     members_at_rest,
     weak_members,
 )
-from pcmc.structure.pulls import turns
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 

@@ -15,11 +15,11 @@ from pcmc import Material, Snow, StructuralModel, Wind, cli
 from pcmc.base.errors import OptionError
 from pcmc.plan import CableLine, Plan
 from pcmc.structure import Member, Profile, analyse, calculix
+from pcmc.structure.frames import balancing_force, turns
 from pcmc.structure.member_forces import (
     forces_on_members,
     members_at_rest,
 )
-from pcmc.structure.pulls import balancing_force, turns
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 

@@ -104,7 +104,7 @@ def test_volumes_are_enclosed(case):
     assert flat_pieces(surface)
     X, d = surface.vertices, random_motion(surface, 2)
     area_vector = vertex_area_vectors(X, surface.faces)[0] / 3.0
-    moving = weighted(surface, 0.0, -1.0)[2]
+    moving = weighted(surface, 0.0, -1.0)[1]
     assert abs(float(((moving - area_vector) * d).sum())) < 1e-12 * np.abs(d).sum()
 
 

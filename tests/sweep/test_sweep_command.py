@@ -157,7 +157,7 @@ def test_the_store_of_a_generator_that_has_changed_is_refused(roof, capsys, monk
 
 
 def test_ctrl_c_before_the_first_case_writes_no_table(roof, capsys, monkeypatch):
-    monkeypatch.setattr("pcmc.sweep.running._batches", lambda *_: iter(()))
+    monkeypatch.setattr("pcmc.sweep.running._batches", lambda *_: (batch for batch in ()))
     given = ["sweep", "roof.toml", *GRID[:1], "--csv", "t.csv", "--workers", "1"]
     assert cli.main(given) == 130
     assert capsys.readouterr().out == ""

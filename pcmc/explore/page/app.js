@@ -1,6 +1,6 @@
 // The page: it sends one request at a time to the server and shows the answers.
 
-import { choice, digits, element } from "./elements.js";
+import { choice, digits, element, find } from "./elements.js";
 import { addSaving, follow } from "./file.js";
 import {
   arrowsOf, COLOURS, fieldOf, showFindings, showLegend, showParts, showSupports, showVerdict,
@@ -25,7 +25,6 @@ const FORMATS = {
   ".ply": "with the numbers", ".stl": "printing", ".vtp": "ParaView, with the numbers", ".fe": "Surface Evolver",
   ".png": "picture of this view",
 };
-const find = (selector) => document.querySelector(selector);
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");
 
 class Page {

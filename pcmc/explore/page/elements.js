@@ -17,6 +17,7 @@ export function element(name, ...parts) {
   return made;
 }
 
+export const find = (selector) => document.querySelector(selector);
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** Four digits, without trailing zeros. */

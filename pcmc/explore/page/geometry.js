@@ -46,8 +46,7 @@ const vertexOf = (X, v) => [X[3 * v], X[3 * v + 1], X[3 * v + 2]];
 
 /** The first point of a ray on triangles (flat indices) that is not cut away, and its triangle; or null. */
 export function hit(X, triangles, [eye, way], cut) {
-  let nearest = Infinity;
-  let found = null;
+  let [nearest, found] = [Infinity, null];
   for (let f = 0; f < triangles.length; f += 3) {
     const [a, b, c] = [0, 1, 2].map((k) => vertexOf(X, triangles[f + k]));
     const [u, w, from] = [minus(b, a), minus(c, a), minus(eye, a)];

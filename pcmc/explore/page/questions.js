@@ -1,10 +1,8 @@
 // Questions about the surface shown: the words of their button meanwhile, and what shows the answer.
 
 import { showDiagram } from "./diagram.js";
-import { capital } from "./elements.js";
+import { capital, find } from "./elements.js";
 import { showCheck } from "./findings.js";
-
-const find = (selector) => document.querySelector(selector);
 
 export const QUESTIONS = {
   check: {

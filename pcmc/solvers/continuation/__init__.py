@@ -3,9 +3,8 @@
 Gives ``follow``, ``Direction`` and ``BoundaryMotion``. May import ``solvers`` and below.
 """
 
-from .boundary_motion import BoundaryMotion
 from .branch import Branch, follow
-from .direction import Direction
 from .options import Ending, FollowOptions
+from .parameters import BoundaryMotion, Direction
 
 __all__ = ["BoundaryMotion", "Branch", "Direction", "Ending", "FollowOptions", "follow"]

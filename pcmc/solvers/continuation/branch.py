@@ -17,10 +17,9 @@ from ...base.errors import MissingExtra, OptionError
 from ...surface import Surface, expect_surface
 from ...surface.lagrange import expect_flat
 from ..result import Callback
-from .boundary_motion import BoundaryMotion
 from .branch_point import ALONG, leaving
-from .direction import Direction, ParameterLine
 from .options import Ending, FollowOptions
+from .parameters import BoundaryMotion, Direction, ParameterLine
 from .state import QUANTITIES, BranchMesh
 from .tracing import Tracer
 
@@ -217,17 +216,9 @@ def _traced(parameter: Direction | BoundaryMotion, tracer: Tracer) -> Branch:
     ending, detail = tracer.run()
     columns = list(tracer.event("", tracer.here.state, 0.0, 0, 0))
     events = pd.DataFrame(tracer.events, columns=columns)
-    return Branch(
-        parameter,
-        pd.DataFrame(tracer.rows),
-        events.drop(columns="surface"),
-        tracer.surfaces,
-        ending,
-        detail,
-        dict(enumerate(events.surface)),
-        tracer.line,
-        tracer.options,
-    )
+    points, kept = pd.DataFrame(tracer.rows), events.drop(columns="surface")
+    end, at_events = (tracer.surfaces, ending, detail), dict(enumerate(events.surface))
+    return Branch(parameter, points, kept, *end, at_events, tracer.line, tracer.options)
 
 
 def follow(

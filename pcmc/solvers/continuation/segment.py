@@ -67,19 +67,13 @@ class Segment:
 
     def turning_point(self, name: str) -> float | None:
         """t at which a quantity is extreme; None where its derivatives at the ends have one sign."""
-        from scipy.optimize import minimize_scalar  # slow to import
+        from scipy.optimize import fminbound  # slow to import
 
         first = self.derivative(name, self.start)
         if first * self.derivative(name, self.end) >= 0.0:
             return None
-        sense = math.copysign(1.0, first)
-        extreme = minimize_scalar(
-            lambda t: -sense * self.value(name, t),
-            bounds=(0.0, self.length),
-            method="bounded",
-            options={"xatol": max(EVENT_ACCURACY, FOLD_ACCURACY * self.length)},
-        )
-        return float(extreme.x)
+        sense, accuracy = math.copysign(1.0, first), max(EVENT_ACCURACY, FOLD_ACCURACY * self.length)
+        return float(fminbound(lambda t: -sense * self.value(name, t), 0.0, self.length, xtol=accuracy))
 
     @cached_property
     def fold(self) -> float | None:

@@ -20,7 +20,7 @@ from ...surface.geometry import vertex_area_vectors
 from ...surface.supports import apply_supports, onto_circles
 from ...surface.topology import SHEET
 from ..smoother import HarmonicExtension
-from .direction import ParameterLine
+from .parameters import ParameterLine
 
 LEAST_VOLUME = 1e-3  # of the size, cubed: smaller prescribed volumes count as this large
 QUANTITIES = ("parameter", "energy", "volume", "height")  # attributes that a goal may name
@@ -39,9 +39,7 @@ class BranchMesh:
         self.line, self.size, self._backend = line, surface.size, backend
         self.part = part = part_by_positions(surface, held) if held else standing_part(surface)
         self.surface = part.surface
-        self.rounding = rounding_left(
-            part.surface, part.classes, part.surface.vertices
-        )  # of the residual, about
+        self.rounding = rounding_left(self.surface, part.classes, self.surface.vertices)  # of the residual
         self.roof: Floats = surface.roof.astype(float)  # (patches,) 1 where the volume over Π is the roof's
         self._curves_move = bool(((part.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None

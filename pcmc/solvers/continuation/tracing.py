@@ -1,6 +1,6 @@
 """From point to point along a branch: steps, the events between them, and the mesh.
 
-A step goes along the tangent, and Newton's method brings it back onto the branch (``correction``). Where a
+A step goes along the tangent, and Newton's method brings it back onto the branch (``branch_point``). Where a
 goal, a fold or a change of index lies between two points, the branch is searched there (``segment``).
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...base.errors import NoBranch, SurfaceError
 from ...base.interrupts import stop_requested
@@ -20,20 +20,22 @@ from ...meshing.remeshing import remesh
 from ...surface import Surface
 from .. import solve_once
 from ..result import Callback, Progress, Status
-from .branch_point import BranchPoint, Tangent, along_branch, branch_point
-from .correction import (
-    Constraint,
+from .branch_point import (
+    BranchPoint,
     ContactChanged,
     MeshCollapsed,
     NotOnBranch,
+    Tangent,
+    along_branch,
+    branch_point,
     correct,
     fixed_arclength,
     fixed_height,
     fixed_parameter,
     fixed_volume,
 )
-from .direction import ParameterLine
 from .options import Ending, FollowOptions
+from .parameters import ParameterLine
 from .segment import Segment, crosses_goal
 from .state import BranchMesh, BranchState
 
@@ -43,15 +45,6 @@ CONTACT_STEP = 0.02  # length of a step at which a new contact, solved for by it
 BEND = 0.1  # correction over step length that the next step aims at
 MAX_BEND = 0.5  # correction over step length above which a step is refused
 MANY_ITERATIONS = 7  # a correction that took more Newton steps may have ended on another branch
-
-
-class BranchStep(NamedTuple):
-    """A step that succeeded: its segment, its correction over its length, and the events on it."""
-
-    segment: Segment
-    bend: float
-    at_goal: bool
-    events: list[dict[str, Any]]
 
 
 class Tracer:
@@ -118,10 +111,10 @@ class Tracer:
             return Ending.REACHED, ""
         length, difficulty = min(abs(self.options.step), self.options.largest), ""
         for _ in range(self.options.steps):
-            step = None
-            while step is None:
+            while True:
                 try:
-                    step = self.step(length)
+                    segment, bend, at_goal, events = self.step(length)
+                    break
                 except NotOnBranch as reason:
                     length, difficulty = 0.5 * length, str(reason)
                     if length < self.options.smallest and self.let_held_walls_pinch():
@@ -129,22 +122,24 @@ class Tracer:
                     elif length < self.options.smallest:
                         collapsed = isinstance(reason, MeshCollapsed)
                         return Ending.DEGENERATE if collapsed else Ending.LOST, difficulty
-            self.events += step.events
-            self.arclength += step.segment.length
-            self.here = step.segment.end
+            self.events += events
+            self.arclength += segment.length
+            self.here = segment.end
             self.record()
-            if step.at_goal:
+            if at_goal:
                 return Ending.REACHED, ""
             folds = sum(event["kind"] == "fold" for event in self.events)
             if self.options.folds is not None and folds >= self.options.folds:
                 return Ending.FOLDS, ""
             self.maintain_mesh()
-            longer = min(2.0, max(0.5, BEND / max(step.bend, 1e-9)))
+            longer = min(2.0, max(0.5, BEND / max(bend, 1e-9)))
             length = min(longer * length, self.options.largest)
         return Ending.STEPS, difficulty
 
-    def step(self, length: float) -> BranchStep:
-        """The next point, at this length, or nearer if a goal is."""
+    def step(self, length: float) -> tuple[Segment, float, bool, list[dict[str, Any]]]:
+        """The next segment, of this length, or shorter to a goal; its correction over its length, whether it
+        ends at a goal, and the events on it.
+        """
         here = self.here.state
         try:
             there = self.solve_at(length)
@@ -171,7 +166,7 @@ class Tracer:
                 given = fixed_parameter(asked, self.line.scale)
                 end = branch_point(correct(end.state, given, self.options.tolerance), self.here.tangent)
             segment = replace(segment, end=end, length=goal[0])
-        return BranchStep(segment, bend, goal is not None, self.events_on(segment))
+        return segment, bend, goal is not None, self.events_on(segment)
 
     def bend(self, there: BranchState, length: float) -> float:
         """Distance of a state from the tangent, over the length of the step."""
@@ -189,29 +184,25 @@ class Tracer:
         return here.step(t * tangent.direction, here.parameter + t * tangent.slope)
 
     def solve_at(self, t: float) -> BranchState:
-        """The state on the branch at arclength t from here."""
-        ahead = self.predict(t)
-        return correct(ahead, self.constraint(t, ahead), self.options.tolerance)
-
-    def constraint(self, t: float, ahead: BranchState) -> Constraint:
-        """What the control prescribes at arclength t from here."""
-        here, tangent = self.here.state, self.here.tangent
+        """The state on the branch at arclength t from here, as far as the control says on the tangent."""
+        here, tangent, ahead = self.here.state, self.here.tangent, self.predict(t)
         if self.options.control == "parameter":
-            return fixed_parameter(ahead.parameter, self.line.scale)
-        if self.options.control == "volume":
+            asked = fixed_parameter(ahead.parameter, self.line.scale)
+        elif self.options.control == "volume":
             growth = float((here.volume_gradient * tangent.direction).sum())
-            return fixed_volume(here.mesh, here.volume + t * growth)
-        if self.options.control == "height":
-            return fixed_height(here.mesh, ahead.highest_vertex, ahead.height)
-        return fixed_arclength(ahead, tangent.row, tangent.rate)
+            asked = fixed_volume(here.mesh, here.volume + t * growth)
+        elif self.options.control == "height":
+            asked = fixed_height(here.mesh, ahead.highest_vertex, ahead.height)
+        else:
+            asked = fixed_arclength(ahead, tangent.row, tangent.rate)
+        return correct(ahead, asked, self.options.tolerance)
 
     def solve_contact(self, near: BranchState) -> BranchState:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
-        part, own = near.rest.part, self.options
+        part = near.rest.part
         whole = part.whole_at(part.landed(near.X, near.mesh.reaches_plane(near.X)))
-        result = solve_once(
-            whole, "newton", target="stationary", tolerance=own.tolerance, backend=own.backend
-        )
+        accurate: dict[str, Any] = {"tolerance": self.options.tolerance, "backend": self.options.backend}
+        result = solve_once(whole, "newton", target="stationary", **accurate)
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
         if not result.converged:

@@ -11,7 +11,7 @@ from generators import two_caps, two_squares
 from pcmc import Direction, Parameter, follow, solve
 from pcmc.base.errors import MissingExtra, OptionError, SurfaceError
 from pcmc.solvers.continuation import Ending, FollowOptions
-from pcmc.solvers.continuation.correction import NotOnBranch, correct, fixed_parameter
+from pcmc.solvers.continuation.branch_point import NotOnBranch, correct, fixed_parameter
 from pcmc.solvers.continuation.options import CONTROLS
 from pcmc.solvers.continuation.segment import root
 from pcmc.solvers.continuation.state import QUANTITIES, BranchMesh, BranchState
@@ -81,7 +81,7 @@ def test_rates_of_goals_are_their_slopes_along_the_branch(parameter):
     start = two_squares(4, alpha_aux=1.0).retensioned({}, {"left": 0.9, "wall": 0.0})  # not alike: one apex
     start = solve(start, target="stationary").surface
     tracer = Tracer(start, line.line(start), {}, FollowOptions(), None)
-    segment = tracer.step(0.05).segment
+    segment = tracer.step(0.05)[0]
     for name in QUANTITIES:
         ahead, behind = (segment.value(name, t) for t in (1e-3, -1e-3))
         slope = segment.derivative(name, segment.start)
