@@ -32,7 +32,18 @@ def crossing_pairs(surface: Surface) -> Ints:
     corners = surface.vertices[surface.faces]
     order = np.asarray(cKDTree(corners.mean(axis=1), leafsize=LEAF).indices)  # neighbours in space follow
     corners, vertices = corners[order].reshape(-1, 3), surface.topology.faces[order]
-    pairs = np.sort(order[_crossing(corners, vertices, _boxes(corners), CLEAR * surface.size)], axis=1)
+    # a binary tree of boxes, their least and greatest coordinates: node i has the children 2 i and 2 i + 1
+    leaves = 1 << max(-(-len(corners) // (3 * LEAF)) - 1, 0).bit_length()
+    boxes = np.full((2 * leaves, 6), np.inf)
+    first = np.arange(0, len(corners), 3 * LEAF)
+    for sign, half in ((1.0, slice(0, 3)), (-1.0, slice(3, 6))):
+        boxes[leaves : leaves + len(first), half] = np.minimum.reduceat(sign * corners, first)
+    while leaves > 1:
+        below = boxes[leaves : 2 * leaves]
+        boxes[leaves // 2 : leaves] = np.minimum(below[::2], below[1::2])
+        leaves //= 2
+    boxes *= [1.0, 1.0, 1.0, -1.0, -1.0, -1.0]
+    pairs = np.sort(order[_crossing(corners, vertices, boxes, CLEAR * surface.size)], axis=1)
     return np.asarray(pairs[np.lexsort(pairs.T[::-1])])
 
 
@@ -66,24 +77,9 @@ def crossing_texts(table: pd.DataFrame, size: float) -> list[str]:
     ]
 
 
-def _boxes(corners: Floats) -> Floats:
-    """(2 k,6) the least and greatest coordinates in a binary tree over k leaves of ``LEAF`` triangles each,
-    k a power of 2: node i has the children 2 i and 2 i + 1, and the root is 1."""
-    leaves = 1 << max(-(-len(corners) // (3 * LEAF)) - 1, 0).bit_length()
-    boxes = np.full((2 * leaves, 6), np.inf)
-    first = np.arange(0, len(corners), 3 * LEAF)
-    for sign, half in ((1.0, slice(0, 3)), (-1.0, slice(3, 6))):
-        boxes[leaves : leaves + len(first), half] = np.minimum.reduceat(sign * corners, first)
-    while leaves > 1:
-        pairs = boxes[leaves : 2 * leaves]
-        boxes[leaves // 2 : leaves] = np.minimum(pairs[::2], pairs[1::2])
-        leaves //= 2
-    return boxes * [1.0, 1.0, 1.0, -1.0, -1.0, -1.0]
-
-
 @compiled
 def _crossing(X: Floats, F: Ints, boxes: Floats, clear: float) -> Ints:
-    """(k,2) the pairs of triangles that cross, of corners X (3 m,3) with the vertices F (m,3)."""
+    """(k,2) the pairs of triangles that cross, with corners X (3 m,3), vertices F (m,3) and boxes."""
     leaves, last = len(boxes) // 2, -(-len(F) // LEAF)
     found, count, stack = np.empty((16, 2), dtype=np.int64), 0, np.empty(64, dtype=np.int64)
     for one in range(last):

@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from .arguments import with_groups
-from .building import draw_, panels_, report_, structure
-from .cutting import pattern
+from .building import draw_, panels_, pattern, report_, structure
 from .files import cache_, convert, explore, plan, plot, repair_, schema
 from .finding import equilibria_
 from .solving import certify_, remesh_, solve_, sweep

@@ -1,4 +1,4 @@
-"""The commands panels, draw, report and structure. Each returns the exit code."""
+"""The commands panels, draw, report, structure and pattern. Each returns the exit code."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ from ..base.errors import FileError, OptionError
 from ..base.files import suffix_of
 from ..base.units import Units
 from ..certificate.certificate import require_certified
+from ..cloth import CuttingOptions
+from ..cloth.sheets import pattern_files
 from ..drawings.drawing_set import NET_SUFFIXES, NET_TABLES, net_files, table_paths
 from ..io import FORMATS, write
 from ..panelling.panel_net import check_grid
-from ..plot import families, panel_planarity
+from ..plot import families, panel_planarity, strains
 from ..project.drawn import files_of
-from ..project.settings import Output, Structure, cost_paths, schedule_paths
+from ..project.settings import Output, Structure, cost_paths, of_material, schedule_paths
 from ..project.writing import analysis_jobs, check_outputs, cost_jobs, model_job, schedule_jobs, write_all
 from ..structure import analyse
 from ..structure.calculix import expect_program
@@ -34,9 +36,7 @@ FAMILY = "Largest difference of edges within a family of triangles."
 PATTERN = "planar-quads along lines of curvature; quads or hexagons of a grid in plan."
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
 COST = "Cost of a family, as of its mould, and of a panel; adds NAME-costs.csv and .svg. Needs --change."
-TOLERANCE = (
-    "Largest difference of edges within a family of panels; adds the schedule. By default the project's."
-)
+ALIKE = "Largest difference of edges within a family of panels; adds the schedule. By default the project's."
 TWO = "two numbers FAMILY,PANEL, 0 or more"
 LINE, FOUR = "Section along this line; may be repeated.", "four numbers X,Y,X,Y"
 TRUE_SIZE = "Draw every panel at true size, as a project may say, too; needs --tolerance."
@@ -46,7 +46,7 @@ THICKNESS = "Thickness of a patch; a bare VALUE applies to every patch that is n
 DENSITY = "Mass per volume; above 0, self-weight is a load."
 RUN = "Run CalculiX on each case and combination; by default as the project says."
 WIND = "Wind pressure on a patch, above 0 for suction on a roof; may be repeated."
-Tolerance = Annotated[float | None, amount("LENGTH", TOLERANCE)]
+Tolerance = Annotated[float | None, amount("LENGTH", ALIKE)]
 
 
 def panels_(
@@ -120,11 +120,8 @@ def panels_(
         if change is None:
             schedule = roof.panels(tolerance, **how)
         else:
-
-            def callback(made: int, count: int) -> None:
-                progress(f"round {made}: {count} families")
-
-            fewer = roof.fewer_families(tolerance, change, callback=callback, **how)
+            how["callback"] = lambda made, count: progress(f"round {made}: {count} families")
+            fewer = roof.fewer_families(tolerance, change, **how)
             schedule = fewer.after
         works: list[Any] = []
         for path in files:
@@ -273,8 +270,7 @@ def structure(
     A project is solved first; its [structure] has the values that no option gives. With --run each case and
     combination is analysed: NAME-cases.csv, NAME-patches.csv, NAME-supports.csv, NAME-cables.csv,
     NAME-members.csv, NAME-member-forces.csv, NAME-columns.csv, NAME-cases.png and NAME-member-forces.png come
-    beside the model.
-    A case that is not carried as a whole ends with the code 1.
+    beside the model. A case that is not carried as a whole ends with the code 1.
 
     \b
     Examples:
@@ -316,3 +312,86 @@ def structure(
         return reports.ended(roof.good)
     print(analysis)
     return reports.ended(roof.good and analysis.carried, written)
+
+
+WIDTH = "Width of the cloth: no strip is wider, with its allowances."
+SEAM = "A seam from point to point along geodesics, instead of others there; may be repeated."
+DIRECTION = "Of the warp in the plan, degrees from x; by default along the longer side of each sheet."
+COMPENSATION = "Percent by which the cloth is cut shorter along warp and weft."
+STIFFNESS = "Force per length of warp and weft, from which the compensation follows."
+NOTCHES = "Distance of the marks along seams, 0 for none; by default the mean width of strips."
+STRIPS = "Picture to draw: the strips on the roof, coloured by strain."
+
+
+@dataclass(frozen=True)
+class Cutting:
+    """What the command line says of a cutting pattern, instead of the project."""
+
+    width: Annotated[float | None, amount("LENGTH", WIDTH)] = None
+    strips: Annotated[int | None, count("Number of strips of each sheet, instead of a width.")] = None
+    seam: Annotated[list[str] | None, option("X,Y,X,Y", SEAM)] = None
+    direction: Annotated[float | None, amount("DEGREES", DIRECTION)] = None
+    compensation: Annotated[str | None, option("WARP,WEFT", COMPENSATION)] = None
+    stiffness: Annotated[str | None, option("WARP,WEFT", STIFFNESS)] = None
+    poisson: Annotated[float | None, amount("NUMBER", "Contraction of the weft, 0.3 by default.")] = None
+    allowance: Annotated[float | None, amount("LENGTH", "Cloth added outside of seams.")] = None
+    hem: Annotated[float | None, amount("LENGTH", "Cloth added at rims; by default the allowance.")] = None
+    notches: Annotated[float | None, amount("LENGTH", NOTCHES)] = None
+
+    def of(self, own: CuttingOptions | None) -> CuttingOptions:
+        """The pattern of a project with these values."""
+        values: dict[str, Any] = {} if own is None else dict(vars(own))
+        given = {name: value for name, value in vars(self).items() if value not in (None, [])}
+        for pair in ({"width", "strips"}, {"compensation", "stiffness"}):  # one or the other
+            if len(pair & given.keys()) == 1:
+                values = {name: value for name, value in values.items() if name not in pair}
+        for name in {"compensation", "stiffness"} & given.keys():
+            given[name] = arguments.numbers(given[name], f"--{name}")
+        if "seam" in given:
+            lines = [arguments.numbers(text, "--seam") for text in given.pop("seam")]
+            for line in lines:
+                if len(line) % 2 or len(line) < 4:
+                    validate.refuse("--seam", ",".join(map(str, line)), "points X,Y,X,Y and so on")
+            given["seams"] = [[line[k : k + 2] for k in range(0, len(line), 2)] for line in lines]
+        return CuttingOptions(**(values | given))
+
+
+def pattern(
+    *,
+    file: Input,
+    output: Annotated[list[Path] | None, MANY_FILES] = None,
+    picture: Annotated[Path | None, option("PNG", STRIPS)] = None,
+    view: ViewName = "diagonal",
+    given: Cutting,
+    sheet: SheetFormat = None,
+    units: FileUnits = "",
+    build: Build,
+) -> int:
+    """Cut a roof into strips of cloth and lay them flat; write sheets and tables.
+
+    A .dxf has all strips at true size with allowances, seams, notches and labels; .pdf and .svg have sheets
+    to scale; a .csv has the table of strips, beside it comes NAME-seams.csv. A project is solved first;
+    its [pattern] has the values that no option gives.
+
+    \b
+    Examples:
+      pcmc pattern roof.toml --width 2.4 -o cloth.dxf -o cloth.pdf
+      pcmc pattern roof.toml --width 2.4 --compensation 0.4,1.5 --allowance 0.04 -o cloth.csv
+    """
+    seen, files = arguments.parsed_view(view, picture), output or []
+    arguments.output_of(file, pattern=files, picture=picture, view=seen)
+    with working() as progress:
+        project = arguments.load_project(file, units)
+        wanted, sheet = given.of(project.pattern), sheet or project.output.sheet
+        start = projects.start_of(project)
+        replace(project.output, pattern=files).check(start.units, project.structure, wanted)
+        of_material(wanted, project.structure, start.surface)
+        roof = build.roof(project, progress)
+        progress("cutting strips")
+        cloth = roof.cutting_pattern(wanted, build.allow_uncertified)
+        jobs: list[Any] = pattern_files(cloth, files, roof.units, sheet, roof.name, roof.mark)
+        if picture is not None:
+            jobs.append((picture, partial(strains, cloth, view=seen)))
+        written = write_all(jobs, progress)
+    print(cloth.text(roof.units))
+    return reports.ended(roof.good, written)

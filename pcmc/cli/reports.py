@@ -8,16 +8,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..certificate.tables import lean_texts
 from ..plan.lines import SNAP, is_straight
 from ..project.advising import Changed, firmer
 from ..project.outcome import MOST_CHECKED, Outcome
 from . import NOT_CERTIFIED, OK
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 FAR = 10.0  # degrees: walls that lean less are not reported
 
@@ -140,7 +137,7 @@ def working() -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def sweeping(console: Console | None = None) -> Iterator[Callable[[Any], None] | None]:
+def sweeping(console: Any = None) -> Iterator[Callable[[Any], None] | None]:
     """A function of a sweep's Progress that draws cases, time left and verdicts; None without a terminal."""
     if console is None and not _live():
         yield None

@@ -291,9 +291,8 @@ class _Search:
                 surface, status = way_down(one.surface, side)
                 if status is Status.STOPPED:
                     raise KeyboardInterrupt
-                to = None
-                if status is Status.CONVERGED:
-                    to = self.add(with_good_triangles(surface), "on the way down from a saddle")
+                arrived, how = status is Status.CONVERGED, "on the way down from a saddle"
+                to = self.add(with_good_triangles(surface), how) if arrived else None
                 end = "" if to is not None else ENDS.get(status, f"no minimum ({status.name.lower()})")
                 ends.append(end)
                 if one.index == 1:
@@ -329,8 +328,7 @@ class _Search:
                 continue
             self.tried.add(pair)
             self.tell("looking for a pass between two minima")
-            result = pass_between(one, other)
-            if result is not None:
+            if (result := pass_between(one, other)) is not None:
                 self.add(result.surface, "between two minima")
 
     def result(self) -> Equilibria:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress, filterfalse, product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
@@ -22,10 +22,7 @@ from .drawing import Drawing
 from .edges import cable_for
 from .lines import Kind, PlanLine
 from .parts import CableLine, Divider, Hole, PatchSpec, check_count, check_keys
-from .plan import Chosen
-
-if TYPE_CHECKING:
-    from .plan import Plan
+from .plan import Chosen, Plan
 
 TRIANGLES = 1500  # of a first roof, about
 FINEST = 6000  # triangles at most, where a part is small

@@ -70,8 +70,7 @@ def solve_once(
     if surface.size == 0.0:
         message = "solve: all vertices are at one point; start from a surface that has a size"
         raise SurfaceError(message, what="vertices")
-    result: Result = solver.solve(surface, validate.options_from(solver.options, method, options), callback)
-    return result
+    return solver.solve(surface, validate.options_from(solver.options, method, options), callback)
 
 
 def solve(

@@ -270,64 +270,42 @@ def relax_tensions(low: Surface) -> Homotopy | None:
 
 
 def continue_in_distance(surface: Surface, low: Surface) -> Homotopy | None:
-    """The distance between the held curves grows to the surface's; None where they cannot be moved."""
-    scaling = BoundaryScaling.of(surface)
-    if scaling is None:
+    """The distances between the held curves grow in proportion to the surface's, along one line.
+
+    It is the line along which their middles lie most apart, or that across Π where the surface slides there.
+    None without two curves to be moved apart, or where the end of a junction or cable slides along one. The
+    other vertices that slide so are held meanwhile, which changes no shape.
+    """
+    for _, mask in surface.on_line:
+        if (mask & surface.topology.on_junction).any() or mask[surface.cable_edges.ends].any():
+            return None
+    slides = surface.on_line and not surface.on_planes
+    clamped = surface.rebuilt(fixed=surface.fixed, on_line=()) if slides else surface
+    groups, lengths = held_groups(clamped)
+    fixed = np.isfinite(lengths)
+    X, plane = clamped.vertices, clamped.plane
+    held = (groups >= 0) & clamped.fixed
+    if len(lengths) < 2 or not fixed.any() or (clamped.fixed & ~held).any() or clamped.on_planes:
         return None
-    shapes = surface.vertices, low.vertices
-    starts = (
-        HomotopyStart(scaling.at(share, shape), BoundaryMotion(scaling.boundary, start=share), share)
-        for share, shape in product(DISTANCES, shapes)
-    )
+    centres = np.array([X[groups == number].mean(axis=0) for number in range(len(lengths))])
+    if clamped.on_plane.any():
+        line, middle = np.array(plane.normal), np.array(plane.point)
+        apart = np.where(fixed, (centres - middle) @ line, 0.0)
+    else:
+        middle = centres.mean(axis=0)
+        line = np.linalg.svd(centres - middle)[2][0]
+        apart = (centres - middle) @ line
+    if np.ptp(apart) < FLAT * clamped.size:
+        return None
+    along = apart[groups[held]]  # how far the curve of each held vertex is from ``middle``, which stays
+
+    def boundary(share: float) -> Floats:
+        return np.asarray(X[held] + ((share - 1.0) * along)[:, None] * line)
+
+    def start(share: float, shape: Floats) -> HomotopyStart:
+        places = shape + ((share - 1.0) * ((shape - middle) @ line))[:, None] * line
+        places[held] = boundary(share)
+        return HomotopyStart(clamped.moved(places), BoundaryMotion(boundary, start=share), share)
+
+    starts = (start(share, shape) for share, shape in product(DISTANCES, (surface.vertices, low.vertices)))
     return Homotopy("distance", "by moving the held curves apart", surface, starts)
-
-
-@dataclass(frozen=True, eq=False)
-class BoundaryScaling:
-    """A surface whose held curves can be moved along one line, the distances between them in proportion."""
-
-    surface: Surface  # at the full distance
-    line: Floats  # (3,) unit vector along which the middles of the curves lie most apart
-    middle: Floats  # (3,) a point that stays
-    along: Floats  # (n,) how far each held vertex's curve is from it
-    held: Bools  # (n,) the vertices that move with their curves
-
-    @classmethod
-    def of(cls, surface: Surface) -> BoundaryScaling | None:
-        """The line through the middles of the fixed curves; that across Π where the surface slides there.
-
-        None without two curves to be moved apart, or where the end of a junction or cable slides along one.
-        The other vertices that slide so are held meanwhile, which changes no shape.
-        """
-        for _, along in surface.on_line:
-            if (along & surface.topology.on_junction).any() or along[surface.cable_edges.ends].any():
-                return None
-        if surface.on_line and not surface.on_planes:
-            surface = surface.rebuilt(fixed=surface.fixed, on_line=())
-        groups, lengths = held_groups(surface)
-        fixed = np.isfinite(lengths)
-        X, plane = surface.vertices, surface.plane
-        held = (groups >= 0) & surface.fixed
-        if len(lengths) < 2 or not fixed.any() or (surface.fixed & ~held).any() or surface.on_planes:
-            return None
-        centres = np.array([X[groups == number].mean(axis=0) for number in range(len(lengths))])
-        if surface.on_plane.any():
-            line, middle = np.array(plane.normal), np.array(plane.point)
-            apart = np.where(fixed, (centres - middle) @ line, 0.0)
-        else:
-            middle = centres.mean(axis=0)
-            line = np.linalg.svd(centres - middle)[2][0]
-            apart = (centres - middle) @ line
-        if np.ptp(apart) < FLAT * surface.size:
-            return None
-        return cls(surface, line, middle, np.where(held, apart[groups], 0.0), held)
-
-    def boundary(self, share: float) -> Floats:
-        """(k,3) the fixed vertices with their curves at a share of the distance."""
-        return (self.surface.vertices + ((share - 1.0) * self.along)[:, None] * self.line)[self.held]
-
-    def at(self, share: float, shape: Floats) -> Surface:
-        """The surface at a share of the distance; its free vertices are those of a shape (n,3), nearer."""
-        X = shape + ((share - 1.0) * ((shape - self.middle) @ self.line))[:, None] * self.line
-        X[self.held] = self.boundary(share)
-        return self.surface.moved(X)

@@ -63,7 +63,8 @@ def newton(
             end.note = f"its triangles are flat, though order={order} was asked for: {why}"
     reached, work = end.state.result_surface(), (len(end.rows) - 1, log.evaluations, end.rows)
     changes = tuple((room_pressures(reached) - room_pressures(first)).tolist())
-    clear, value = [end.clear] if end.clear else [], energy(reached) if reached.rooms else end.state.energy
+    value = energy(reached) if reached.rooms else end.state.energy
+    clear = [end.clear] if end.clear else []
     return Result(reached, end.status, "newton", value, *work, end.note, room_changes=changes, clear=clear)
 
 

@@ -67,10 +67,9 @@ def _search(start: Surface, first: Result, solves: Solves) -> Result:
         tried.append(end)
         if end.folds:
             break
-    proofs = (*filter(None, [load]), *proofs)
     neck = pinched_neck(first.surface) if first.status is Status.DEGENERATE else None
-    if first.rows[-1]["residual"] <= AT_REST:  # a coarse mesh may rest where no smooth surface does
-        proofs = ()
+    coarse = first.rows[-1]["residual"] <= AT_REST  # a coarse mesh may rest where no smooth surface does
+    proofs = () if coarse else (*filter(None, [load]), *proofs)
     status, folds = first.status, [attempt for attempt in tried if attempt.folds]
     if proofs:
         status = Status.NO_EQUILIBRIUM

@@ -60,10 +60,9 @@ class Sweep:
         for what, values in (("grid", grid), ("fixed", fixed or {})):
             if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
                 validate.refuse(what, values, "a dict by parameter names")
-        object.__setattr__(self, "case", case if isinstance(case, str) else _path(case))
-        object.__setattr__(self, "grid", {name: _axis(name, grid[name]) for name in grid})
+        axes = {name: _axis(name, grid[name]) for name in grid}
         plain = {name: _plain(value, name) for name, value in (fixed or {}).items()}
-        object.__setattr__(self, "fixed", plain)
+        vars(self).update(case=case if isinstance(case, str) else _path(case), grid=axes, fixed=plain)
         if not self.grid:
             raise OptionError("the grid is empty; give at least one parameter a list of values", what="grid")
         for name in self.grid.keys() & plain.keys():

@@ -102,7 +102,8 @@ def run(
             # Ctrl-C comes out of the queue, not in the middle of a write
             stack.enter_context(interrupts_handled(lambda *_: finished.put(None)))
             submit = stack.enter_context(crew.opened(sweep.case))
-            progress = _progress(records, todo, len(sweep))
+            counts = Counter(r.verdict or r.status for n, r in records.items() if n not in todo)
+            before, begin = counts.total(), time.perf_counter()
             for futures in stack.enter_context(closing(_batches(submit, todo, finished))):
                 new: list[Record] = []
                 try:
@@ -114,28 +115,15 @@ def run(
                 records |= {record.case: record for record in new}
                 try:
                     for record in new:
+                        counts[record.verdict or record.status] += 1
+                        done, total = counts.total(), len(sweep)
+                        left = (total - done) * (time.perf_counter() - begin) / (done - before)
                         if on_record is not None:
-                            on_record(progress(record))
+                            on_record(SweepProgress(record, done, total, dict(counts), left))
                 except StopIteration as error:
                     stop_requested(error)
                     break
     return table(records.values())
-
-
-def _progress(
-    records: dict[int, Record], todo: dict[int, Any], total: int
-) -> Callable[[Record], SweepProgress]:
-    """A function that counts a new record and returns the state of the sweep."""
-    counts = Counter(r.verdict or r.status for n, r in records.items() if n not in todo)
-    before, begin = total - len(todo), time.perf_counter()
-
-    def count(record: Record) -> SweepProgress:
-        counts[record.verdict or record.status] += 1
-        done = counts.total()
-        pace = (time.perf_counter() - begin) / (done - before)
-        return SweepProgress(record, done, total, dict(counts), pace * (total - done))
-
-    return count
 
 
 def _batches(
