@@ -162,7 +162,7 @@ def test_the_export_downloads_the_surface(page, driver, explorer):
         until(lambda: driver.switch_to.active_element.text == "Export", "the keyboard to be where it was")
         path = driver.downloads / f"the hall{suffix}"
         # the browser keeps the name with an empty file while it downloads
-        until(lambda: path.exists() and path.stat().st_size, f"the download of {path.name}")
+        until(lambda path=path: path.exists() and path.stat().st_size, f"the download of {path.name}")
         if suffix == ".png":
             assert path.read_bytes().startswith(b"\x89PNG")
             continue
