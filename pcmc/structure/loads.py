@@ -256,19 +256,37 @@ def roof_slopes(surface: Surface) -> Floats:
 
 
 def _in_zone(load: Snow | Wind, surface: Surface) -> Bools:
-    """(m,) the faces whose slope is a load's, and whose middle is in its area."""
+    """(m,) the faces whose slope is a load's, and whose middle is in its area.
+
+    OptionError where there are none, and for an area that goes on behind a mirror plane, but not as the image
+    of what is in front.
+    """
     (least, most), slope = load.slopes, roof_slopes(surface)
     chosen: Bools = ((slope > least + 1e-9) | (least == 0.0)) & (slope <= most + 1e-9)
     if len(load.area):
-        x, y = surface.plane.to_local(surface.vertices[surface.faces].mean(axis=1)).T[:2, :, None]
-        (a, b), (c, d) = (np.roll(np.array(load.area), -k, axis=0).T for k in (0, 1))
-        crossed = (b > y) != (d > y)  # (m,k) by the line from the point along x
-        with np.errstate(divide="ignore", invalid="ignore"):
-            chosen &= (crossed & (x < a + (y - b) * (c - a) / (d - b))).sum(axis=1) % 2 == 1
+        middle = surface.vertices[surface.faces].mean(axis=1)
+        here = _within(load.area, surface.plane.to_local(middle))
+        for mirror in (plane for plane, _ in surface.on_planes if plane.mirror):
+            image = middle - 2.0 * mirror.height(middle)[:, None] * np.array(mirror.normal)
+            there = _within(load.area, surface.plane.to_local(image))
+            if there.any() and (there != here).any():
+                text = f"{load.name}: its area goes on behind the {mirror}, and is another one there; let it"
+                text += " end at the mirror, or take the whole roof: --whole, or pcmc.mirrored(surface)"
+                raise OptionError(text, what=load.name)
+        chosen &= here
     if not chosen.any():
         text = f"{load.name}: no triangle has its middle in the area and its slope in {[least, most]}"
         raise OptionError(f"{text}; check the zone", what=load.name)
     return chosen
+
+
+def _within(area: Sequence[Sequence[float]], places: Floats) -> Bools:
+    """(m,) the places (m,3), in the coordinates of Π, that are within a polygon."""
+    x, y = places.T[:2, :, None]
+    (a, b), (c, d) = (np.roll(np.array(area), -k, axis=0).T for k in (0, 1))
+    crossed = (b > y) != (d > y)  # (m,k) by the line from the place along x
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray((crossed & (x < a + (y - b) * (c - a) / (d - b))).sum(axis=1) % 2 == 1)
 
 
 def _checked_zone(kind: str, load: Snow | Wind) -> dict[str, Any]:

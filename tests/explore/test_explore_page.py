@@ -161,7 +161,8 @@ def test_the_export_downloads_the_surface(page, driver, explorer):
         page.find(f"#export button[value='{suffix}']").send_keys("\n")
         until(lambda: driver.switch_to.active_element.text == "Export", "the keyboard to be where it was")
         path = driver.downloads / f"the hall{suffix}"
-        until(path.exists, f"the download of {path.name}")
+        # the browser keeps the name with an empty file while it downloads
+        until(lambda path=path: path.exists() and path.stat().st_size, f"the download of {path.name}")
         if suffix == ".png":
             assert path.read_bytes().startswith(b"\x89PNG")
             continue

@@ -76,6 +76,22 @@ def test_snow_and_weight_behind_a_mirror_that_is_not_upright_are_refused():
             StructuralModel(half, Material(5e5, density=1.0), 1e-3, [load])
 
 
+def test_a_zone_that_is_another_one_behind_a_mirror_is_refused():
+    """A drift from 1 m before the ridge to the far eave was one of 1 m on each side of it."""
+    half, whole = halves()
+
+    def steps(surface, x0, x1):
+        drift = Snow(0.1, area=[[x0, -1], [x1, -1], [x1, 7], [x0, 7]])
+        return StructuralModel(surface, Material(5e5), 1e-3, [drift], cable_area=1e-4, anyway=True).steps
+
+    for x0, x1 in ((3.0, 5.0), (3.0, 7.0), (-1.0, 11.0)):
+        steps(half, x0, x1)
+    steps(whole, 4.0, 11.0)
+    with refused(OptionError, what="snow") as caught:
+        steps(half, 4.0, 11.0)
+    assert "take the whole roof: --whole" in str(caught.value)
+
+
 def test_a_cable_in_a_mirror_is_in_balance_as_in_the_whole():
     half, whole = (pcmc.certify(surface) for surface in halves())
     columns = ["sheet_pull", "cable_pull"]

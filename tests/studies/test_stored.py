@@ -109,6 +109,7 @@ def test_a_name_that_becomes_public_is_no_other_code(written):
     assert written.files() == before
 
 
+@pytest.mark.nightly
 def test_the_code_of_a_commit_is_compared_by_the_rules_of_today(tmp_path):
     """The provenance's own hashes stand in where git does not know the commit, or there were changes."""
     commit = git("rev-parse", "HEAD")
