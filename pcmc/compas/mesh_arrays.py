@@ -143,9 +143,10 @@ def read_vertices(named: Mapping[str, Any], whole: WholeMesh) -> tuple[list[Vert
             vertices.append(Vertex(name, key, point, support, -1 if guide is None else guide, planes))
     if not vertices:
         validate.refuse("meshes", list(named), "meshes with faces", error=SurfaceError)
-    on_planes = [number for vertex in vertices for number in vertex.planes]
-    guides = GUIDE, len(whole.guides), [vertex.guide for vertex in vertices]
-    for what, listed, numbers in (guides, (PLANES, len(whole.planes), on_planes)):
+    for what, listed, numbers in (
+        (GUIDE, len(whole.guides), [vertex.guide for vertex in vertices]),
+        (PLANES, len(whole.planes), [number for vertex in vertices for number in vertex.planes]),
+    ):
         if (largest := max(numbers, default=-1)) >= listed:
             text = f"a vertex has {what!r} {largest}, but attributes[{KEY!r}] lists only {listed} of them;"
             text = f"{text} keep the mesh that has this attribute, or remove {what!r} from the vertices"

@@ -229,10 +229,16 @@ def solve(
         warnings.simplefilter("always")
         start = from_meshes(meshes, tensions=tensions, pressures=pressures, weld=weld)
         result = pcmc.solve(start, **options)
-        answer = {key: getattr(result, key) for key in ("converged", "message", "energy", "iterations")}
-        answer |= {"meshes": to_meshes(result.surface), "status": result.status.name.lower()}
-        answer["certificate"] = _plain_certificate(result.certificate)
-        return answer | {"warnings": [str(one.message) for one in caught]}
+        return {
+            "meshes": to_meshes(result.surface),
+            "converged": result.converged,
+            "status": result.status.name.lower(),
+            "message": result.message,
+            "energy": result.energy,
+            "iterations": result.iterations,
+            "certificate": _plain_certificate(result.certificate),
+            "warnings": [str(one.message) for one in caught],
+        }
 
 
 def certify(

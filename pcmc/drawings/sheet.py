@@ -144,7 +144,8 @@ class Dimension(NamedTuple):
         feet[:, 1 - self.axis] = self.at
         away = np.sign(feet - ends)
         lines = [feet, *np.stack([ends + away, feet + away], axis=1), *(feet[:, None] + TICK)]
-        place = feet.mean(axis=0) + 0.8 * SMALL * np.array([[0.0, 1.0], [-1.0, 0.0]])[self.axis]
+        beside = np.array([0.0, SMALL] if self.axis == 0 else [-SMALL, 0.0])
+        place = feet.mean(axis=0) + 0.8 * beside
         text = Text(place, self.text, layer="PCMC-DIM", align="C", turn=90.0 * self.axis)
         return [SheetLine(line, "PCMC-DIM") for line in lines], text
 

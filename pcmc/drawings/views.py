@@ -114,10 +114,11 @@ def plan_view(surface: Surface, curves: Lines, points: Sequence[tuple[Floats, st
     """From above: panels, curves with names of cables and members, points, places of outline and walls."""
     view = _seen("plan", surface, curves, np.eye(3)[:2], surface.roof[surface.patch_of_face])
     view.points = [(at[:2], name, layer) for at, name, layer in points]
+    middle = 0.5 * np.sum(view.box, axis=0)
     for curve in curves:
         if curve.layer in ("PCMC-CABLE", MEMBERS):
             at = curve.points[len(curve.points) // 2, :2]
-            away = at - 0.5 * np.sum(view.box, axis=0)
+            away = at - middle
             view.texts.append((at, curve.name, away / (np.linalg.norm(away) or 1.0)))
     view.stations = outline_places(curves, (1.0, 0.0, 0.0)), outline_places(curves, (0.0, 1.0, 0.0))
     return view
@@ -243,7 +244,8 @@ def _add_dimensions(sheet: Sheet, view: DrawnView, factor: float, shift: Floats,
         mark = np.array([[x, y], [x + 1.2, y + 2.0], [x - 1.2, y + 2.0]])
         rule = np.array([[x - 2.0, y], [x + 18.0, y]])
         sheet.lines += [SheetLine(mark, "PCMC-DIM", True), SheetLine(rule, "PCMC-DIM")]
-        text = f"{z:+.{decimals}f}" if round(z, decimals) else f"±{abs(z):.{decimals}f}"
+        text = f"{z:+.{decimals}f}"
+        text = text if float(text) else f"±{abs(z):.{decimals}f}"
         sheet.texts.append(Text((x + 2.0, y + 0.7 * SMALL), text, layer="PCMC-DIM"))
 
 

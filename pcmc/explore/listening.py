@@ -172,8 +172,9 @@ class PageHandler(BaseHTTPRequestHandler):
                 self._send(body, BYTES, name)
             case ["POST", "api", *session, act] if act in REQUESTS and len(session) == (act != "open"):
                 turn = re.fullmatch(r"(\w{1,20}) (\d{1,9})", self.headers.get("X-Turn", ""))
-                given = "".join(session), act, json_object(content), self._gone
-                self._send(explorer.answer(*given, turn and (turn[1], int(turn[2]))), BYTES)
+                place = None if turn is None else (turn[1], int(turn[2]))
+                given = "".join(session), act, json_object(content)
+                self._send(explorer.answer(*given, self._gone, place), BYTES)
             case _:
                 raise RequestError(f"there is nothing at {parts.path:.60}", HTTPStatus.NOT_FOUND)
 
@@ -186,7 +187,8 @@ class PageHandler(BaseHTTPRequestHandler):
         """Answer with one line, and close: what is left of the request must not be read as another one."""
         self.close_connection = True
         line = " ".join(line.split())
-        line = line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}…"
+        if len(line) > LONGEST_LINE:  # it repeats what was asked; what to type stands at its end
+            line = f"{line[:200]}…{line[-80:]}"
         self._send(json.dumps({"error": line}).encode(), "application/json", status=status)
 
     def _send_file(self, name: str) -> None:
@@ -212,7 +214,7 @@ class PageHandler(BaseHTTPRequestHandler):
 
 
 TYPES = {"f": "<f4", "u": "<u4"}
-LONGEST_LINE = 280  # characters
+LONGEST_LINE = 1000  # characters
 MOST_AIMS = 100  # targets, and parameters, of one request
 Check = Callable[[str, Any], Any]  # the value of a key, given its place in the request; else RequestError
 

@@ -61,7 +61,10 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     model.add_properties("Pcmc_Surface", roof, {name: ("IfcText", text) for name, text in texts.items()})
     areas = patch_areas(surface) * model.square_metres
     place = roof.ObjectPlacement
-    parts = [model.add_part(*one, float(areas[one[0]]), place) for one in patch_meshes(surface)]
+    parts = [
+        model.add_part(k, color, used, faces, float(areas[k]), place)
+        for k, color, used, faces in patch_meshes(surface)
+    ]
     parts += [model.add_cable(cable, place) for cable in surface.cables]
     parts += [model.add_member(line, place) for line in content.members]
     model.aggregate("roof's parts", roof, parts)
@@ -111,10 +114,15 @@ class _Model:
         self.rooted("IfcRelAggregates", role, RelatingObject=whole, RelatedObjects=parts)
 
     def add_roof(self) -> Any:
-        kind, about = "IfcGeometricRepresentation", dict[str, Any](ContextType="Model")
-        frame = {"Precision": 1e-9 * self.surface.size, "WorldCoordinateSystem": self.axes()}
-        context = self.add(f"{kind}Context", CoordinateSpaceDimension=3, **frame, **about)
-        kind, about = f"{kind}SubContext", {"ParentContext": context, **about}
+        context = self.add(
+            "IfcGeometricRepresentationContext",
+            ContextType="Model",
+            CoordinateSpaceDimension=3,
+            Precision=1e-9 * self.surface.size,
+            WorldCoordinateSystem=self.axes(),
+        )
+        about = {"ContextType": "Model", "ParentContext": context}
+        kind = "IfcGeometricRepresentationSubContext"
         self.body = self.add(kind, ContextIdentifier="Body", TargetView="MODEL_VIEW", **about)
         self.axis = self.add(kind, ContextIdentifier="Axis", TargetView="GRAPH_VIEW", **about)
         about = {"RepresentationContexts": [context], "UnitsInContext": assigned_units(self.add, self.units)}

@@ -223,11 +223,14 @@ def in_new_unit(value: Any, factor: float) -> Any:
         case Patch() | Cable() | Room():
             parts = {Patch: "patches", Cable: "cables", Room: "rooms"}[type(value)]
             powers = {kind.field: POWERS[kind.dimension] for kind in KINDS.values() if kind.parts == parts}
-            old = [(f, getattr(value, f), factor ** abs(p), p > 0) for f, p in powers.items()]
-            return replace(value, **{f: x * by if up else x / by for f, x, by, up in old})
+            new: dict[str, float] = {}
+            for name, power in powers.items():
+                old, by = getattr(value, name), factor ** abs(power)
+                new[name] = old * by if power > 0 else old / by
+            return replace(value, **new)
         case Plane() | Line() | Circle():
-            key = value.KEYS[0]  # of its point
-            moved: dict[str, Any] = {key: tuple(factor * x for x in getattr(value, key))}
+            point, _ = value.KEYS
+            moved: dict[str, Any] = {point: tuple(factor * x for x in getattr(value, point))}
             moved |= {"radius": factor * value.radius} if isinstance(value, Circle) else {}
             return replace(value, **moved)
         case HeldCurve():

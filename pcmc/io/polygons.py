@@ -34,8 +34,11 @@ def cut_polygons(X: Floats, corners: Ints, counts: Ints) -> tuple[Ints, Ints, tu
     """
     if len(odd := np.flatnonzero((counts < 3) | (counts > LARGEST))):
         at, k = int(odd[0]), int(counts[odd[0]])
-        more = f"more than {LARGEST}; cut it into triangles {ELSEWHERE}"
-        text = f"face {at} has {k} corners{'; a face needs three or more' if k < 3 else f', {more}'}"
+        text = f"face {at} has {k} corners"
+        if k < 3:
+            text += "; a face needs three or more"
+        else:
+            text += f", more than {LARGEST}; cut it into triangles {ELSEWHERE}"
         raise FileError(text, where=at, found=k, expected=(3, LARGEST))
     if (counts == 3).all():
         return corners.reshape(-1, 3), np.arange(len(counts)), ()

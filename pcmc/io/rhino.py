@@ -70,10 +70,11 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     if content.walls is not None:
         model.Layers[0].SetUserString(WALLS, content.walls)  # of the whole model, so once
     for name, kind in HELD.items():
-        held, cloud = surface.vertices[support_of(surface) == kind], rhino.PointCloud()
-        for point in held.tolist():
-            cloud.Add(rhino.Point3d(*point))
+        held = surface.vertices[support_of(surface) == kind]
         if len(held):
+            cloud = rhino.PointCloud()
+            for point in held.tolist():
+                cloud.Add(rhino.Point3d(*point))
             model.Objects.AddPointCloud(cloud, _layer(rhino, model, name, COLORS[name], content.metadata))
     _add_curves(rhino, model, surface, replaced, content)
     for member in content.members:

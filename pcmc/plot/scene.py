@@ -276,11 +276,16 @@ def _with_pyvista(scene: Scene, frame: Frame) -> Floats:
             round_dots = {"style": "points", "render_points_as_spheres": True, "point_size": SAMPLES * DOT}
             plotter.add_mesh(dots, **plain, **round_dots)
         (right, up, towards), depth = scene.view.axes, scene.view.depth(scene.corners.reshape(-1, 3))
-        thick, reach = np.ptp(depth), max(np.ptp(depth), max(frame.size) / frame.scale)
-        (across, high), camera = frame.low + np.array(frame.size) / (2.0 * frame.scale), plotter.camera
+        across, high = frame.low + np.array(frame.size) / (2.0 * frame.scale)
         focus = across * right + high * up + depth.max() * towards
-        camera.position, camera.focal_point, camera.up = focus + reach * towards, focus, up
-        camera.parallel_projection, camera.parallel_scale = True, frame.size[1] / (2.0 * frame.scale)
+        thick = np.ptp(depth)
+        reach = max(thick, max(frame.size) / frame.scale)
+        camera = plotter.camera
+        camera.position = focus + reach * towards
+        camera.focal_point = focus
+        camera.up = up
+        camera.parallel_projection = True
+        camera.parallel_scale = frame.size[1] / (2.0 * frame.scale)
         camera.clipping_range = (0.5 * reach, 1.5 * reach + thick)
         image = plotter.screenshot(return_img=True)
         plotter.close()

@@ -79,6 +79,12 @@ def test_wrong_values_are_answered_in_one_line(explorer, session, path, body, li
     assert len(error) < 300
 
 
+def test_what_to_type_at_the_end_of_a_long_line_is_kept(explorer, session):
+    body = json.dumps({"tensions": {"a" * 300: 1.0}})
+    _, content = asked(explorer, "POST", f"/api/{session}/follow", body)
+    assert json.loads(content)["error"].endswith("Known: cap")
+
+
 @pytest.mark.parametrize("token", ["", "x", "\xe9"])
 @pytest.mark.parametrize(("method", "path"), [("POST", "/api/open"), ("GET", "/"), ("GET", "/api/x/export")])
 def test_without_the_token_of_its_address_nothing_is_answered(explorer, method, path, token):
