@@ -248,8 +248,8 @@ def test_other_tensions_are_solved_and_not_kept(folder):
 
 def test_explore_opens_the_designed_roof_also_if_it_misses_its_target(folder, monkeypatch, capsys):
     shown = []
-    monkeypatch.setattr("pcmc.explore.start", lambda *given, watch: (*given, watch))
-    monkeypatch.setattr("pcmc.explore.open_and_wait", lambda given, page: shown.append(given[0].surface))
+    monkeypatch.setattr("pcmc.cli.files.start", lambda *given, watch: (*given, watch))
+    monkeypatch.setattr("pcmc.cli.files.open_and_wait", lambda given, page: shown.append(given[0].surface))
     for name in ("roof.toml", "high.toml"):
         assert cli.main(["explore", name, "--no-browser"]) == 0
     assert shown[0].vertices[:, 2].max() == pytest.approx(0.6, abs=1e-6)
@@ -269,7 +269,7 @@ def test_ctrl_c_is_130_and_keeps_nothing(folder, monkeypatch, capsys, kind):
 
         return meet(*given, callback=stop, **options)
 
-    monkeypatch.setattr("pcmc.design.meet", pressed)
+    monkeypatch.setattr("pcmc.project.solving.meet", pressed)
     for command in (["convert", "roof.toml", "a.obj"], ["certify", "roof.toml"], ["explore", "roof.toml"]):
         assert cli.main(command) == 130
         assert capsys.readouterr() == ("", "pcmc: stopped\n")

@@ -89,10 +89,11 @@ def test_a_run_with_all_outputs_computes_each_finding_once(folder, monkeypatch):
         "pcmc.project.outcome.certify",
         "pcmc.certificate.certificate.certify",
         "pcmc.certificate.certify",
-        "pcmc.panelling.panels",
+        "pcmc.project.outcome.panels",
         "pcmc.drawings.drawing_set.panels",
         "pcmc.report.document.panels",
-        "pcmc.accuracy.check_mesh",
+        "pcmc.project.outcome.check_mesh",
+        "pcmc.project.outcome.figures",
         "pcmc.certificate.quantities.figures",
     )
     roof = project.run("roof.toml")
@@ -105,7 +106,7 @@ def test_a_mesh_check_that_fails_is_in_the_report(folder, monkeypatch):
     def fails(*_, **__):
         raise OptionError("too many triangles")
 
-    monkeypatch.setattr("pcmc.accuracy.check_mesh", fails)
+    monkeypatch.setattr("pcmc.project.outcome.check_mesh", fails)
     Path("roof.toml").write_text(WITH_UNITS + '[output]\nreport = "roof.pdf"\n', encoding="utf-8")
     roof = project.run("roof.toml")
     assert roof.mesh_check is None
