@@ -223,7 +223,7 @@ def in_new_unit(value: Any, factor: float) -> Any:
         case Patch() | Cable() | Room():
             parts = {Patch: "patches", Cable: "cables", Room: "rooms"}[type(value)]
             powers = {kind.field: POWERS[kind.dimension] for kind in KINDS.values() if kind.parts == parts}
-            new: dict[str, float] = {}
+            new: dict[str, Any] = {}
             for name, power in powers.items():
                 old, by = getattr(value, name), factor ** abs(power)
                 new[name] = old * by if power > 0 else old / by
