@@ -80,6 +80,8 @@ class Target:
             kind = NAMED.get(self.quantity, "patch")
             message = f"{self.quantity}: expected the name of a {kind}, found {validate.shown(self.of)}"
             raise OptionError(message, what="of", found=self.of)
+        if not isinstance(self.name, str):
+            validate.refuse("name", self.name, "a text")
         for key in ("value", "at_most", "at_least"):
             if getattr(self, key) is not None:
                 validate.number(key, getattr(self, key), where=self.label)

@@ -182,6 +182,7 @@ def test_a_search_tells_its_progress_and_can_be_stopped(hall_session, monkeypatc
         ({"targets": [{"quantity": "apex", "of": "west", "value": 10**400}]}, "a finite number"),
         ({"targets": [{"quantity": "apex", "of": "w" * 5000, "value": 1}]}, "vary: expected a list"),
         ({"targets": [{"quantity": ["apex"]}]}, "unknown quantity"),
+        ({"targets": [{"quantity": "height", "of": [3, 3], "value": 1, "name": {"a": 1}}]}, "name: expected"),
         ({"targets": [{"quantity": "height", "of": [1], "value": 1}]}, "height: expected a point"),
         (
             {"targets": [{"quantity": "height", "of": [10**400, 1], "value": 1}]},
