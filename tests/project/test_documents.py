@@ -270,7 +270,7 @@ def test_files_have_the_mark_of_a_roof_that_is_not_in_order(tmp_path, monkeypatc
 def test_a_picture_of_any_colour_has_the_mark(monkeypatch, colour, views):
     marks, views = [], views[: 1 if colour == "reactions" else 2]
     for drawn in ("draw", "panel", "reactions"):
-        monkeypatch.setattr(f"pcmc.plot.{drawn}", lambda *_, mark, **_look: marks.append(mark))
+        monkeypatch.setattr(f"pcmc.project.writing.{drawn}", lambda *_, mark, **_look: marks.append(mark))
     draw_picture(spherical_cap(0.5), "roof.png", views, colour, mark="TARGETS NOT MET")
     assert marks == ["TARGETS NOT MET"]
 
