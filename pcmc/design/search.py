@@ -360,8 +360,8 @@ class Search:
             "high": self.limits[:, 1],
         }
         assert isinstance(here.result, Result)
-        pairs = (targets, self.targets), (parameters, self.parameters)
-        aims, varied = (pd.DataFrame(table, index=[each.label for each in own]) for table, own in pairs)
+        aims = pd.DataFrame(targets, index=[t.label for t in self.targets])
+        varied = pd.DataFrame(parameters, index=[p.label for p in self.parameters])
         history = pd.DataFrame([self.row(trial) for trial in self.tried])
         reason = self.failure if status is DesignStatus.AT_FOLD else ""
         return Design(status, here.result, aims, varied, self.solves, history, reason)

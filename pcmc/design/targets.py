@@ -141,7 +141,7 @@ def as_targets(given: Target | Iterable[Target]) -> list[Target]:
 
 def _point(of: Any) -> tuple[float, float]:
     try:
-        x, y = map(validate.real, of)
+        x, y = of
     except (TypeError, ValueError):
         message = f"height: expected a point (x, y) of Π, found {of!r}"
         raise OptionError(message, what="of", found=of) from None

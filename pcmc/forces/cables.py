@@ -106,10 +106,8 @@ def laws_on(topo: Topology, surface: Surface) -> Floats:
     alone = np.flatnonzero(place < 0)
     if len(alone):
         i, j = (int(v) for v in ends[alone[0]])
-        message = (
-            f"the cable from vertex {i} to {j} runs where no patch has a tension or a pressure; give the"
-        )
-        message += " patches there a tension, or remove the cable"
+        message = f"the cable from vertex {i} to {j} runs where no patch has a tension or a pressure;"
+        message += " give the patches there a tension, or remove the cable"
         raise SurfaceError(message, what="cables", where=(i, j))
     laws = np.zeros((len(topo.edges), 2))
     laws[place] = np.stack([tension, weight], axis=1)

@@ -53,8 +53,9 @@ def _across(shapes: Shapes, q: int, i: int, u: Vector, v: Vector) -> Vector:
 def measure_elements(
     mesh: Mesh, X: Floats, first: int, last: int, area: Floats, volume: Floats, moment: Floats, out: Floats
 ) -> None:
-    """Add A, V and ∫ z dA of elements first..last to (k,) each, and ∇(αA - pV + w ∫ z dA) to ``out``
-    (n,3), unless it has no rows.
+    """Add A, V and ∫ z dA of elements first..last to (k,) each, and ∇(αA - pV + w ∫ z dA) to ``out`` (n,3).
+
+    An ``out`` of no rows is left out.
     """
     shapes, origin, ground, n = mesh.shapes, vector(mesh.origin), vector(mesh.ground), vector(mesh.normal)
     for e in range(first, last):

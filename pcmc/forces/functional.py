@@ -176,8 +176,8 @@ def by_rates(surface: Surface, rates: Rates, X: Floats | None = None) -> tuple[f
     sums, out = weighted(surface, tensions, net, X, weights)
     change = float((np.stack([tensions, -net, weights]) * sums).sum())
     none, elements = np.zeros(len(surface.cables)), list[Elements]()
-    pulls, weights = rates.get("cables", none), rates.get("cable_weights", none)
-    for cable, pull, weight in zip(surface.cables, pulls, weights, strict=True):
+    pulls, loads = rates.get("cables", none), rates.get("cable_weights", none)
+    for cable, pull, weight in zip(surface.cables, pulls, loads, strict=True):
         if pull or weight:
             each = np.full((2, len(cable.edges)), [[pull], [weight]])
             elements.append(cables.line_integrals(surface, X, cable.edges, *each))

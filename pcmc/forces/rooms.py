@@ -275,11 +275,10 @@ def _fans(surface: Surface, room: Room, signs: Floats) -> Iterator[float]:
         tips = np.flatnonzero(net)  # where it comes down to Π: closed straight from tip to tip
         if not grounded[tips].all():
             place = surface.vertices[tips[~grounded[tips]][0]]
-            text = f"room {room.name!r} does not close: its fixed boundary ends at"
-            text += (
-                f" {point_text(place, surface.size)}, off Π; fix it down to Π, or choose Π (plane=) through"
-            )
-            raise SurfaceError(f"{text} it", what="rooms", where=room.name, found=place.tolist())
+            at = point_text(place, surface.size)
+            text = f"room {room.name!r} does not close: its fixed boundary ends at {at}, off Π;"
+            text += " fix it down to Π, or choose Π (plane=) through it"
+            raise SurfaceError(text, what="rooms", where=room.name, found=place.tolist())
         if len(tips):
             yield float((net[tips] * _cones(middle, X[tips].mean(axis=0), X[tips])).sum())
 

@@ -91,10 +91,8 @@ def wall_rows(
     rows = WallRows(vertices, ends, fraction, zero, none, feet)
     drop = rows.drops(surface, X)
     top = np.linalg.norm(drop, axis=1)
-    share, stands = (
-        np.einsum("ij,ij->i", X[vertices] - rows.places(surface, X), drop),
-        top > ON * surface.size,
-    )
+    share = np.einsum("ij,ij->i", X[vertices] - rows.places(surface, X), drop)
+    stands = top > ON * surface.size
     relative = np.clip(np.divide(share, top**2, out=zero.copy(), where=stands), 0.0, 1.0)
     if not stands.all():  # steps to the foot, over those to the foot and to the top
         inner = np.zeros(surface.n, dtype=bool)

@@ -55,9 +55,16 @@ def cut_curves(surface: Surface, along_curves: Floats, project: Projection | Non
         surface = refined_round(surface)
         counts = _pieces(surface, along_curves)
     stay, cable = _curve_edges(surface)
-    curves, numbers = surface.topology.edges[stay], np.arange(surface.n)
-    about = curves, surface.support_columns, numbers, cable[stay], surface.edges_on_curves[stay]
-    mesh = CurveMesh(surface.vertices, surface.faces, surface.patch_of_face, *about)
+    mesh = CurveMesh(
+        surface.vertices,
+        surface.faces,
+        surface.patch_of_face,
+        curves=surface.topology.edges[stay],
+        support=surface.support_columns,
+        source=np.arange(surface.n),
+        cable=cable[stay],
+        on=surface.edges_on_curves[stay],
+    )
     support = edge_columns(surface)[stay]
     while (counts > 1).any():
         mesh, along_curves, counts, support = _cut_once(mesh, along_curves, counts, support)
@@ -80,9 +87,11 @@ def _curve_edges(surface: Surface) -> tuple[Bools, Ints]:
 
 
 def refined_round(surface: Surface) -> Surface:
-    """1→4 with the new vertices off the curves on cubics that end square to the vertex normals. With t the
-    components of the edge b - a across the normals at its ends, the middle of the cubic is (a + b)/2 + (t_a -
-    t_b)/8."""
+    """1→4 with the new vertices off the curves on cubics that end square to the vertex normals.
+
+    With t the components of the edge b - a across the normals at its ends, the middle of the cubic is
+    (a + b)/2 + (t_a - t_b)/8.
+    """
     topo, n = surface.topology, surface.n
     chosen = np.flatnonzero(~_curve_edges(surface)[0])
     # the normals of each sheet at its vertices
@@ -117,26 +126,36 @@ def _cut_once(
     """Every curve edge that is to be cut, cut in two, with its triangles."""
     cut = counts > 1
     ends, pieces, on = mesh.curves[cut], counts[cut], mesh.on[cut]
-    first, (size_start, size_end), (start, end) = pieces // 2, size[ends].T, mesh.X[ends.T]
+    first = pieces // 2
+    (size_start, size_end), (start, end) = size[ends].T, mesh.X[ends.T]
     share = place_between(first / pieces, size_start, size_end)
     at, points = on.between(share)
     points = np.where(on.drawn[:, None], points, start + share[:, None] * (end - start))
     number = len(mesh.X) + np.arange(len(ends))
     halves = np.stack([ends[:, 0], number], 1), np.stack([number, ends[:, 1]], 1)
-    X, curves = np.concatenate([mesh.X, points]), np.concatenate([mesh.curves[~cut], *halves])
+    X = np.concatenate([mesh.X, points])
     size = np.concatenate([size, size_start + share * (size_end - size_start)])
     kept = np.concatenate([np.flatnonzero(~cut), np.flatnonzero(cut), np.flatnonzero(cut)])
-    about = curves, np.concatenate([mesh.support, support[cut]]), np.arange(len(X)), mesh.cable[kept]
-    new = CurveMesh(X, *cut_triangles(mesh.F, mesh.patch, ends, number), *about, mesh.on.cut(cut, at))
+    new = CurveMesh(
+        X,
+        *cut_triangles(mesh.F, mesh.patch, ends, number),
+        curves=np.concatenate([mesh.curves[~cut], *halves]),
+        support=np.concatenate([mesh.support, support[cut]]),
+        source=np.arange(len(X)),
+        cable=mesh.cable[kept],
+        on=mesh.on.cut(cut, at),
+    )
     return new, size, np.concatenate([counts[~cut], first, pieces - first]), support[kept]
 
 
 def cut_triangles(
     F: Ints, patch: Ints, ends: Ints, number: Ints, first: Ints | None = None
 ) -> tuple[Ints, Ints]:
-    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four. The edges
-    ``ends`` (k,2) get the vertices ``number`` (k,). With two cut sides a line leads to the middle of one of
-    them from the corner opposite: of the side opposite corner ``first`` (m,), where that is given."""
+    """Triangles with a new vertex on one, two or three sides, replaced by two, three or four.
+
+    The edges ``ends`` (k,2) get the vertices ``number`` (k,). With two cut sides a line leads to the middle
+    of one of them from the corner opposite: of the side opposite corner ``first`` (m,), where that is given.
+    """
     place = edge_places(F[:, SIDES], ends)
     middle = np.where(place >= 0, number[place], -1)
     count = (middle >= 0).sum(axis=1)
@@ -184,7 +203,9 @@ def check_sizes(edge_length: npt.ArrayLike, n: int) -> Floats:
     if size.shape != (n,):
         message = f"edge_length: expected a number, or an array of shape ({n},), found shape {size.shape}"
         raise OptionError(message, what="edge_length", found=size.shape, expected=(n,))
-    for vertex in np.flatnonzero(~(np.isfinite(size) & (size > 0.0))).tolist():
+    wrong = ~(np.isfinite(size) & (size > 0.0))
+    if wrong.any():
+        vertex = int(np.argmax(wrong))
         value, expected = float(size[vertex]), "a finite number > 0"
         message = f"edge_length of vertex {vertex}: expected {expected}, found {value}"
         raise OptionError(message, what="edge_length", where=vertex, found=value, expected=expected)

@@ -60,8 +60,10 @@ def flat_places(surface: Surface, X: Floats) -> Floats:
 
 
 def blended(surface: Surface, X: Floats, on_curve: Bools) -> Floats:
-    """X (n,3) with the nodes of elements on their flat triangles, but for those ``on_curve`` (n,). Inside an
-    element the distances that nodes ``on_curve`` on its sides have from there are blended."""
+    """X (n,3) with the nodes of elements on their flat triangles, but for those ``on_curve`` (n,).
+
+    Inside an element the distances that nodes ``on_curve`` on its sides have from there are blended.
+    """
     p, nodes, flat = surface.order, surface.nodes, flat_places(surface, X)
     share = lattice(p).nodes / p
     inside, moved = np.flatnonzero(share.min(axis=1) > 0.0), X.copy()

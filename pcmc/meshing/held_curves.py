@@ -131,8 +131,10 @@ def onto_held_curves(surface: Surface, corners: Ints | None = None) -> Projectio
 
 
 def held_corners(surface: Surface) -> Ints:
-    """Vertices (k,) of held edges at which none of these goes on into another one. On a finer mesh curves
-    turn less at them. So that they stay corners there, keep their numbers."""
+    """Vertices (k,) of held edges at which none of these goes on into another one.
+
+    On a finer mesh curves turn less at them. So that they stay corners there, keep their numbers.
+    """
     edges = held_edges(surface)
     edge, end, *_ = _continuations(surface.vertices, edges, CORNER)
     return np.setdiff1d(edges, edges[edge, end])
@@ -145,9 +147,11 @@ def held_edges(surface: Surface) -> Ints:
 
 
 def _arcs_over(X: Floats, edges: Ints, corner: float, corners: Ints | None) -> tuple[Floats, Bools]:
-    """The rises (e,2,3) of the arcs over held edges (e,2), and which of the two there are (e,2). With a, b an
-    edge's ends, c the next vertex of the curve beyond one, ℓ = |b - a|: the circle has the curvature κ = 2
-    |(b - a) × (c - a)| / (ℓ |c - b| |a - c|), the arc the height (1 - √(1 - κ²ℓ²/4)) / κ."""
+    """The rises (e,2,3) of the arcs over held edges (e,2), and which of the two there are (e,2).
+
+    With a, b an edge's ends, c the next vertex of the curve beyond one, ℓ = |b - a|: the circle has the
+    curvature κ = 2 |(b - a) × (c - a)| / (ℓ |c - b| |a - c|), the arc the height (1 - √(1 - κ²ℓ²/4)) / κ.
+    """
     rises, arcs = np.zeros((len(edges), 2, 3)), np.zeros((len(edges), 2), dtype=bool)
     edge, end, beyond, _ = _continuations(X, edges, corner)
     if corners is not None:

@@ -66,7 +66,9 @@ def surface_from_labels(
     if weld > 0.0:
         label = components(cKDTree(X).query_pairs(weld, output_type="ndarray"), len(X))
         F = np.unique(label, return_index=True)[1][label][F]
-    for first in np.flatnonzero((F[:, [1, 2, 0]] == F).any(axis=1))[:1].tolist():
+    flat = (F[:, [1, 2, 0]] == F).any(axis=1)
+    if flat.any():
+        first = int(np.argmax(flat))
         merged = f"when vertices nearer than weld={weld:g} are merged; use a smaller weld"
         raise SurfaceError(f"faces[{first}] vanishes {merged}", what="faces", where=first)
     used, F = np.unique(F, return_inverse=True)
@@ -115,7 +117,9 @@ def _oriented(X: Floats, F: Ints, patch: Ints, plane: Plane) -> Ints:
     same = edge[pairs[:, 0], 0] == edge[pairs[:, 1], 0]
     one, two = pairs.T // 3
     side = one_sided_copies(one, two, same, m)
-    for face in np.flatnonzero(side[:m] == side[m:])[:1].tolist():
+    both = side[:m] == side[m:]
+    if both.any():
+        face = int(np.argmax(both))
         problem = f"the patch of face {face} has only one side (like a Möbius strip)"
         raise SurfaceError(f"{problem}; cut it into two patches", what="faces", where=face)
     part = np.minimum(side[:m], side[m:])

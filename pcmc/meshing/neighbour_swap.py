@@ -72,7 +72,9 @@ class Film:
 
 def film_of(surface: Surface, patch: int) -> Film | None:
     """The strip that a patch is; None for one of another shape, or without four different patches beside it.
-    A film with further sides at junctions, such as a wall below a roof, is a strip across the short ones."""
+
+    A film with further sides at junctions, such as a wall below a roof, is a strip across the short ones.
+    """
     topo, original = surface.topology, surface.original
     curves = [curve for curve in topo.junctions if patch in curve.sheets]
     edges = [topo.sides[topo.edge_numbers(curve.pairs)] for curve in curves]
@@ -306,9 +308,14 @@ def _opened(film: Film, mesh: _Mesh, edges: Ints, half: Floats, columns: int) ->
     shares = 1.0 - 2.0 * np.arange(1, columns + 1) / columns
     parting = np.concatenate([half, (half[split, None] * shares[:, None]).reshape(-1, 3)])
     own = np.concatenate([np.arange(count), np.repeat(split, columns)])  # the vertex that each one was
-    corners = np.concatenate([mesh.steps, steps.reshape(len(new), *mesh.steps.shape[1:])])
-    triangles = np.concatenate([V, vertices]), corners, np.concatenate([mesh.patch, patch])
-    return _Mesh(mesh.X[own] + parting, mesh.supports[own], *triangles), parting
+    opened = _Mesh(
+        mesh.X[own] + parting,
+        mesh.supports[own],
+        np.concatenate([V, vertices]),
+        np.concatenate([mesh.steps, steps.reshape(len(new), *mesh.steps.shape[1:])]),
+        np.concatenate([mesh.patch, patch]),
+    )
+    return opened, parting
 
 
 def _parted(

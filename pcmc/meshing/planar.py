@@ -65,7 +65,8 @@ def triangulate(
     origin = file_origin(given, bounding_size(given))  # near it distances keep their digits
     fixed, inside_holes = given - origin, np.reshape(holes, (-1, 2)) - origin
     validate.positive("edge_length", edge_length)
-    for i, j in sorted(cKDTree(fixed).query_pairs(1e-9 * edge_length))[:1]:
+    if near := cKDTree(fixed).query_pairs(1e-9 * edge_length):
+        i, j = min(near)
         problem = f"points {i} and {j} coincide at {given[i].tolist()}; merge them"
         raise SurfaceError(problem, what="points", where=(i, j))
     if len(segments) < 3:

@@ -146,8 +146,10 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
 
 
 def edge_columns(surface: Surface) -> Bools:
-    """(e,c) the supports of the new vertices on edges, as in ``Surface.support_columns``. A new vertex slides
-    along a line or circle if both ends of its edge lie on it, and one of them slides."""
+    """(e,c) the supports of the new vertices on edges, as in ``Surface.support_columns``.
+
+    A new vertex slides along a line or circle if both ends of its edge lie on it, and one of them slides.
+    """
     columns, edges = [*held_midpoints(surface), *edges_on_planes(surface)], surface.topology.edges
     for guide, along in surface.given_supports.on_line:
         on = surface.fixed & (guide.distance(surface.vertices) <= ON * surface.size)
@@ -211,9 +213,12 @@ def with_vertices_on(
 
 
 def midpoints(surface: Surface, edges: Ints) -> Floats:
-    """(k,3) the middles of edges (k,2), for a finer mesh. A wall's edge may lead from a resting junction to a
-    standing vertex. Its middle is placed in its row below the middle of the top edge: rows that coincide
-    where the junction rests part again beside it."""
+    """(k,3) the middles of edges (k,2), for a finer mesh.
+
+    A wall's edge may lead from a resting junction to a standing vertex. Its middle is placed in its row
+    below the middle of the top edge (``WallRows``): rows that coincide where the junction rests part again
+    beside it.
+    """
     (start, end), X, topo = edges.T, surface.vertices, surface.topology
     if surface.order > 1:
         on_edges = np.empty((len(topo.edges), 3))
@@ -223,12 +228,13 @@ def midpoints(surface: Surface, edges: Ints) -> Floats:
     walls, rows, resting = part.walls, part.walls.rows, part.resting
     if not resting.any():
         return middle
-    own, top, share, offset = rows.vertices, X.copy(), np.zeros((surface.n, 1)), np.zeros_like(X)
-    drop, down, of_wall = X - surface.plane.nearest(X), resting.copy(), resting | walls.top_free
+    own, of_wall, down = rows.vertices, resting | walls.top_free, resting.copy()
+    of_wall[own], down[own] = True, under_low(rows, resting | walls.corner)
+    top, drop = X.copy(), X - surface.plane.nearest(X)
     drop[walls.held] = X[walls.held] - X[walls.foot[walls.held]]
     top[own], drop[own] = rows.top_places(X), rows.drops(surface, X)
-    share[own, 0] = 1.0 - rows.relative_height
-    offset[own], of_wall[own], down[own] = rows.offset, True, under_low(rows, resting | walls.corner)
+    share, offset = np.zeros((surface.n, 1)), np.zeros_like(X)  # 0 on top edges
+    share[own, 0], offset[own] = 1.0 - rows.relative_height, rows.offset
     rising = of_wall[start] & of_wall[end] & (down[start] != down[end])
     rising &= ~(surface.fixed[start] & surface.fixed[end])
     top, share, offset, drop = (v[edges[rising]].mean(axis=1) for v in (top, share, offset, drop))

@@ -235,7 +235,8 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
     for number, mesh in enumerate(meshes):
         chosen = best[mesh.patch] == number
         vertex = np.where(mesh.source >= 0, mesh.source, first + np.arange(len(mesh.X)))
-        faces, patch = [*faces, vertex[mesh.F[chosen]]], [*patch, mesh.patch[chosen]]
+        faces.append(vertex[mesh.F[chosen]])
+        patch.append(mesh.patch[chosen])
         first += len(mesh.X)
     used, inverse = np.unique(np.concatenate(faces), return_inverse=True)
     F, patch_of_face = inverse.reshape(-1, 3), np.concatenate(patch)

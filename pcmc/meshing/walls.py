@@ -176,13 +176,13 @@ class _Builder:
         height = self.local[top.vertices, 2] - self.floor[top.vertices]
         low = height <= self.tolerance
         low[[0, -1]] &= low.all() | (height[[0, -1]] < -self.tolerance)
-        for bad in np.flatnonzero(low)[:1]:
-            vertex, at = int(top.vertices[bad]), self.local[top.vertices[bad]].round(6).tolist()
-            text = f"no room for a wall under vertex {vertex}, {height[bad]:.3g} above the wall's bottom, at"
-            text += f" {at} ({low.sum()} such vertices); raise it, or use shorter edges if both ends of the"
-            raise SurfaceError(
-                f"{text} wall are held", what="vertices", where=vertex, found=float(height[bad])
-            )
+        if low.any():
+            first = int(np.argmax(low))
+            vertex, found = int(top.vertices[first]), float(height[first])
+            text = f"no room for a wall under vertex {vertex}, {found:.3g} above the wall's bottom,"
+            text += f" at {self.local[vertex].round(6).tolist()} ({low.sum()} such vertices);"
+            text += " raise it, or use shorter edges if both ends of the wall are held"
+            raise SurfaceError(text, what="vertices", where=vertex, found=found)
 
     def line(self, vertex: int, supported: set[int]) -> list[int]:
         """Vertices of the vertical line under a vertex, from the foot up to the vertex itself."""

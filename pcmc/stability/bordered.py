@@ -58,10 +58,16 @@ def solve_preconditioned(
     """z with ``times(z)`` = right (N,) to a relative accuracy, by GMRES, and the residual after each step:
     that of ``inverse(times(z))``, over the norm of ``right``."""
     residuals: list[float] = []
-    A, M = (LinearOperator(2 * right.shape, each, dtype=float) for each in (times, inverse))
-    note = residuals.append
+    shape = len(right), len(right)
     z, _ = gmres(
-        A, right, M=M, rtol=accuracy, restart=restart, maxiter=cycles, callback=note, callback_type="pr_norm"
+        LinearOperator(shape, times, dtype=float),
+        right,
+        M=LinearOperator(shape, inverse, dtype=float),
+        rtol=accuracy,
+        restart=restart,
+        maxiter=cycles,
+        callback=residuals.append,
+        callback_type="pr_norm",
     )
     return z, residuals
 

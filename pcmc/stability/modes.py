@@ -118,8 +118,9 @@ def lowest(system: SecondVariation, count: int) -> tuple[Floats, Floats]:
         else:
             excluded = system.of.excluded
             across = null_space(excluded.T) if excluded.shape[1] else np.eye(size)
-            H, M = (across.T @ each @ across for each in (system.matrix.toarray(), np.diag(root**2)))
-            values, vectors = eigh(H, M) if across.shape[1] else (np.empty(0), H)
+            H = across.T @ system.matrix.toarray() @ across
+            M = across.T @ np.diag(system.of.mass) @ across
+            values, vectors = eigh(H, M) if len(H) else (np.empty(0), H)
             values, vectors = values[:k], across @ vectors[:, :k]
         # one more than are wanted, and all negative ones: these may be farther from zero than positive ones
         rounding = SAME_EIGENVALUE * np.abs(values).max(initial=0.0)

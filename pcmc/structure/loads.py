@@ -33,11 +33,10 @@ class Step:
 
     def plus(self, last: Step, first: Step, factor: float) -> Step:
         """This step and ``factor`` times what ``last`` has more than ``first``: loads add up."""
-        sums: list[Any] = []
-        for name in ("pressures", "forces", "gravity"):
-            own, end, begin = (getattr(step, name) for step in (self, last, first))
-            sums.append(own + factor * (end - begin))
-        return Step(self.name, *sums)
+        pressures = self.pressures + factor * (last.pressures - first.pressures)
+        forces = self.forces + factor * (last.forces - first.forces)
+        gravity = self.gravity + factor * (last.gravity - first.gravity)
+        return Step(self.name, pressures, forces, gravity)
 
 
 @dataclass(frozen=True)
@@ -194,8 +193,8 @@ def step_name(together: Sequence[Load]) -> str:
 
 def check_loads(
     loads: object, surface: Surface, replaced: Sequence[str] = ()
-) -> tuple[tuple[Load, ...], ...]:
-    """The loads of each step, whose patches are there; none on walls ``replaced`` by members, and none that
+) -> tuple[Load | tuple[Load, ...], ...]:
+    """Loads, or tuples of them, whose patches are there; none on walls ``replaced`` by members, and none that
     acts downwards beside mirror planes that lean."""
     expected = "a sequence of SelfWeight, Snow or Wind, or of tuples of these"
     if isinstance(loads, Load) or not isinstance(loads, Sequence):
@@ -213,7 +212,7 @@ def check_loads(
                 if name in replaced:
                     text = f"{load.name}: a member stands in the place of {name!r}, so no load acts on it"
                     raise OptionError(f"{text}; leave it out", what="loads", where=name)
-    return tuple(map(acting_together, loads))
+    return tuple(loads)
 
 
 def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) -> dict[str, dict[str, float]]:

@@ -44,8 +44,9 @@ class Material:
             missing = "shear" if self.shear is None else "weft"
             text = f"Material.{missing} is missing: a cloth needs young, weft and shear"
             raise OptionError(text, what=f"Material.{missing}")
-        limits: dict[str, Any] = dict.fromkeys(("young", *(("weft", "shear") * self.cloth)), STIFF)
-        limits |= {"poisson": {"least": 0.0, "below": 0.5}, "density": {"least": 0.0, "most": LARGEST}}
+        limits: dict[str, Any] = {"young": STIFF, "poisson": {"least": 0.0, "below": 0.5}}
+        limits |= {"density": {"least": 0.0, "most": LARGEST}}
+        limits |= {"weft": STIFF, "shear": STIFF} if self.cloth else {}
         for name, bounds in limits.items():
             vars(self)[name] = validate.number(f"Material.{name}", getattr(self, name), **bounds)
         if self.weft is not None and self.poisson**2 * self.weft >= self.young:

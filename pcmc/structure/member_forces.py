@@ -82,7 +82,8 @@ class MemberForces:
         across = (turns(P, self.line.closed) * self.pulls).sum(axis=1) / np.where(size > 0.0, size, 1.0)
         found = np.stack([size, -self.balance[0] * across], axis=1)
         found /= (0.5 * (edges + np.roll(edges, 1)))[:, None]
-        found[[] if self.line.closed else [0, -1]] = np.nan
+        if not self.line.closed:
+            found[[0, -1]] = np.nan
         return found
 
     @property
@@ -184,8 +185,9 @@ def supports_with_members(results: StepResults) -> pd.DataFrame:
     moved = standing.vertices + np.nan_to_num(results.displacements)
     cables = cable_ends(standing, moved, results.cable_tensions)
     for line in model.lines:
-        for v in [] if line.closed else line.vertices[[0, -1]][model.held[line.vertices[[0, -1]]]].tolist():
-            names.setdefault(v, []).append(line.name)
+        for v in [] if line.closed else line.vertices[[0, -1]].tolist():
+            if model.held[v]:
+                names.setdefault(v, []).append(line.name)
     ends = sorted(names)
     alone[ends] = 0.0
     for _, v, force in cables:
@@ -224,8 +226,8 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
     lines, force, length = list[str](), units.behind("force"), units.behind("length")
     moment = f"{force}·{units.length}" if units else ""
     for beam in members_at_rest(model):
-        (N, share), (least, most, _, M) = beam.balance, beam.largest.values()
-        far = most if most > -least else least
+        (N, share), most = beam.balance, beam.largest
+        M, far = most["M"], max(most["least_N"], most["largest_N"], key=abs)
         about = f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {M:.3g}{moment}"
         about += f", M/N = {M / abs(far):.2g}{length}" if far else ""
         stiff = f"{beam.enough:.3g} times its E A and E I keep the deflection below 1/{LIMIT:.0f} of the span"
@@ -286,7 +288,7 @@ def cable_offers(model: StructuralModel) -> list[str]:
         if beam.line.wall and alone and N > 0.0 and share > STRAIGHT:
             text = f"{on}: with these lines of its divider a cable finds the shape that does not bend:"
             lines += [text, "wall = false", f"cable = {N:.4g}"]
-            lines += [f'name = "{on}"'] * bool(re.fullmatch(r"wall \d+", on))
+            lines += [f'name = "{on}"'] if re.fullmatch(r"wall \d+", on) else []
     return lines
 
 

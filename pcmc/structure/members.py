@@ -80,13 +80,12 @@ class Member:
         validate.choice("Member.kind", self.kind, KINDS)
         validate.choice("Member.ends", self.ends, ENDS)
         validate.flag("Member.propped", self.propped)
-        no_curve = self.propped and not isinstance(self.on, Curve)
-        for key, wrong, problem in (
-            ("material", self.material.cloth, "its material is a cloth; give it young alone"),
-            ("propped", no_curve, "propped is for edges of the boundary; leave it out"),
-        ):
-            if wrong:
-                raise OptionError(f"member {self.label!r}: {problem}", what=f"Member.{key}", where=self.label)
+        if self.material.cloth:
+            text = f"member {self.label!r}: its material is a cloth; give it young alone"
+            raise OptionError(text, what="Member.material", where=self.label)
+        if self.propped and not isinstance(self.on, Curve):
+            text = f"member {self.label!r}: propped is for edges of the boundary; leave it out"
+            raise OptionError(text, what="Member.propped", where=self.label)
 
     @property
     def label(self) -> str:

@@ -25,7 +25,16 @@ from ..surface.parts import Cable
 from ..surface.supports import apply_supports
 from .frames import balancing_force, corner_forces, in_planes
 from .gas import Gas
-from .loads import GRAVITY, Load, SelfWeight, Step, check_combinations, check_loads, load_steps
+from .loads import (
+    GRAVITY,
+    Load,
+    SelfWeight,
+    Step,
+    acting_together,
+    check_combinations,
+    check_loads,
+    load_steps,
+)
 from .material import Material
 from .members import WHOLE, Member, PlacedMember, bars_on, lines_on
 
@@ -123,8 +132,8 @@ class StructuralModel:
 
     @property
     def weights(self) -> list[SelfWeight]:
-        steps: Any = self.loads  # tuples, once they are checked
-        return [load for together in steps for load in together if isinstance(load, SelfWeight)]
+        single = [load for entry in self.loads for load in acting_together(entry)]
+        return [load for load in single if isinstance(load, SelfWeight)]
 
     @property
     def note(self) -> str:

@@ -209,25 +209,31 @@ def _check(tables: list[Tables], model: StructuralModel, steps: Sequence[Step]) 
     cables = np.array([number for *_, numbers, _ in model.cable_edges() for number in numbers])
     known = {"displacements": nodes, "stresses": model.faces + 1, "forces": held, "cables": cables}
     for number, blocks in enumerate(tables[: len(steps)], 1):
-        found = {kind: np.unique(of_increments[-1].ids) for kind, of_increments in blocks.items()}
         for kind in ("displacements", "stresses", *["forces"] * bool(len(held))):
-            if kind not in found:
+            if kind not in blocks:
                 text = f"step {number} has no {kind}; run ccx on the model's file again"
                 raise FileError(text, where=number)
-        if "forces" in found:
-            known["all forces"], found["all forces"] = nodes, np.union1d(found["forces"], nodes)
-            found["forces"] = np.intersect1d(found["forces"], held)
-        for kind, numbers in known.items():
-            own, what = found.get(kind, numbers), OWNERS.get(kind, "nodes")
-            if len(own) != len(numbers):
-                text = f"has {len(own)} {what}, the model {len(numbers)}; they belong to different surfaces"
-                raise FileError(text, found=len(own), expected=len(numbers))
-            for other in own[own != numbers][:1].tolist():
-                text = f"its {what} are numbered otherwise than the model's ({other} is not there)"
-                raise FileError(text, where=other)
+        if len(blocks["displacements"]) != len(blocks["stresses"]):
+            text = f"step {number} ends within an increment; run ccx on the model's file again"
+            raise FileError(text, where=number)
+        for kind, of_increments in blocks.items():
+            for own in (np.unique(block.ids) for block in of_increments):
+                if kind == "forces":
+                    _check_numbers("nodes", np.union1d(own, nodes), nodes)
+                    own = np.intersect1d(own, held)
+                _check_numbers(OWNERS.get(kind, "nodes"), own, known.get(kind, own))
     if len(tables) > len(steps):
         text = f"has {len(tables)} steps, the model {len(steps)}; is it another model's?"
         raise FileError(text, found=len(tables), expected=len(steps))
+
+
+def _check_numbers(what: str, own: Ints, numbers: Ints) -> None:
+    if len(own) != len(numbers):
+        text = f"has {len(own)} {what}, the model {len(numbers)}; they belong to different surfaces"
+        raise FileError(text, found=len(own), expected=len(numbers))
+    for other in own[own != numbers][:1].tolist():
+        text = f"its {what} are numbered otherwise than the model's ({other} is not there)"
+        raise FileError(text, where=other)
 
 
 class ResultBlock(NamedTuple):

@@ -65,8 +65,9 @@ class _Placed:
 
     def lies_in(self, plane: Plane) -> bool:
         """Whether a line or circle through a point of the plane stays in it."""
-        turned = np.cross if isinstance(self, Circle) else np.dot
-        return bool(np.linalg.norm(turned(self._axis, plane._axis)) <= PARALLEL)
+        if isinstance(self, Circle):
+            return bool(np.linalg.norm(np.cross(self.normal, plane.normal)) <= PARALLEL)
+        return bool(abs(np.dot(self._axis, plane.normal)) <= PARALLEL)
 
     def _apart(self, other: Any) -> float:
         return float(np.abs(self.distance(other._origin)))

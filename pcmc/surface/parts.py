@@ -73,11 +73,12 @@ class Patch:
         object.__setattr__(self, "wall", bool(self.wall))
         _check_loads(self, "only a wall may have 0", "pressure", "weight", "snow")
         if self.tension == 0.0 and (self.pressure or self.weight or self.snow):
-            bears = "carries snow" if self.snow else "weighs something"
-            hint = f"a patch that {bears} must pull; give it a tension"
             if self.pressure:
-                hint = f"a patch under pressure {self.pressure:g} must pull; a wall (pressure=0) may have"
-                hint += " tension 0"
+                hint = f"a patch under pressure {self.pressure:g} must pull;"
+                hint += " a wall (pressure=0) may have tension 0"
+            else:
+                bears = "carries snow" if self.snow else "weighs something"
+                hint = f"a patch that {bears} must pull; give it a tension"
             validate.refuse("tension", 0.0, "> 0", self.name, hint, SurfaceError)
 
     @property

@@ -285,10 +285,9 @@ def checked_planes(
             continue
         sides = before, behind = int((height > near).sum()), int((height < -near).sum())
         if before and behind:
-            text = f"the surface crosses the {plane}: {before} vertices are in front of it and {behind}"
-            text += (
-                " behind; keep one half, as pcmc.cut(surface, plane) gives it, or leave the mirror plane out"
-            )
+            text = f"the surface crosses the {plane}: {before} vertices are in front of it"
+            text += f" and {behind} behind; keep one half, as pcmc.cut(surface, plane) gives it,"
+            text += " or leave the mirror plane out"
             raise SurfaceError(text, what="on_planes", where=str(plane), found=sides)
         refuse_in_mirror(plane, mask, F, patch, names)
     return tuple(planes)

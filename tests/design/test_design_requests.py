@@ -127,6 +127,12 @@ def test_the_two_sheets_of_a_cushion_are_no_two_pressures_of_a_search():
     )
 
 
+@pytest.mark.parametrize("x", ["a", None, True])
+def test_a_place_that_is_no_number_is_shown_as_given(x):
+    with refused(OptionError, what="height: x", found=x):
+        Target("height", (x, 2.0))
+
+
 def test_a_tension_may_be_0_only_where_nothing_presses_or_weighs():
     surface = joined_caps(2.0, alpha_aux=3.0)
     assert Parameter("wall", low=0.0, high=1.0).bounds(surface) == (0.0, 1.0)

@@ -77,6 +77,7 @@ def test_loads_balance_their_totals():
     """The pressure's force is ours; snow weighs s times the plan, self-weight ρ t g times the area."""
     surface = pyramid()
     model = model_of(surface, loads=LOADS)
+    assert model.loads == tuple(LOADS)  # as given: a load, or loads that act together
     form, weight, snow, both = model.steps
     assert [step.name for step in model.steps] == ["form pressure", "self-weight", "snow", "snow and wind"]
     assert model.nodal_loads(form).sum(axis=0) == pytest.approx([0, 0, total_load(surface)])

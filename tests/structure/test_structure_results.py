@@ -83,6 +83,25 @@ def test_damaged_results_are_refused_in_one_line(tmp_path):
         pcmc.read_results(path, model)
 
 
+def test_results_with_a_damaged_increment_before_the_last_are_refused(tmp_path):
+    """Else the share at which a face gets slack was one of other places, or an error of a library."""
+    model, path = model_of(pyramid()), tmp_path / "model.dat"
+    text = dat_text(model)[0]
+    half = text.replace(f"{1.0:.7E}", f"{0.5:.7E}")
+    path.write_text(half + text)
+    assert pcmc.read_results(path, model)[0].share == 1.0
+    lines = half.splitlines(keepends=True)
+    rows = [k for k, line in enumerate(lines) if line.count("E") >= 3]
+    lost = {4: [rows[0]], 3: rows[-2:]}  # a displacement; the stresses of an element
+    for left, gone in lost.items():
+        path.write_text("".join(line for k, line in enumerate(lines) if k not in gone) + text)
+        with refused(FileError, found=left, expected=left + 1):
+            pcmc.read_results(path, model)
+    path.write_text(half + text[: text.index(" stresses")])
+    with refused(FileError, where=1):
+        pcmc.read_results(path, model)
+
+
 def test_results_of_another_surface_or_analysis_are_refused(tmp_path):
     path = tmp_path / "model.dat"
     path.write_text(dat_text(model_of(pyramid()))[0])
