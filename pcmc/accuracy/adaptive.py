@@ -177,8 +177,8 @@ def solve_to_accuracy(
     if importlib.util.find_spec("mmgpy") is None:
         raise MissingExtra("mmgpy", "remesh")
     project = boundary if callable(boundary) else None
-    known = None if project else vertex_numbers(corners, surface.n)
-    if not project and validate.choice("boundary", boundary, BOUNDARIES) == "smooth":
+    known = vertex_numbers(corners, surface.n) if project is None else None
+    if project is None and validate.choice("boundary", boundary, BOUNDARIES) == "smooth":
         project = onto_held_curves(surface, corners=known)
     given = {"boundary": boundary, "corners": corners}
     return _Search(wanted, accuracy_of, given, project, most_triangles, callback, options).run(surface)
@@ -220,9 +220,11 @@ def check_places(wanted: Mapping[str, float], surface: Surface) -> None:
 
 
 def goals_in(table: pd.DataFrame, wanted: Mapping[str, float]) -> dict[Goal, float]:
-    """The accuracy of each row of a mesh check's table that is asked for. A quantity alone stands for that of
-    the whole surface, and where there is none, as for heights, for those of all patches. With a patch it
-    stands for all curves of that patch, too."""
+    """The accuracy of each row of a mesh check's table that is asked for.
+
+    A quantity alone stands for that of the whole surface, and where there is none, as for heights, for those
+    of all patches. With a patch it stands for all curves of that patch, too.
+    """
     goals: dict[Goal, float] = {}
     for name, accuracy in wanted.items():
         quantity, _, patch = name.partition(" of ")
@@ -281,24 +283,27 @@ class _Search:
         except (StopIteration, KeyboardInterrupt) as error:
             stop_requested(error)
             status, detail = AccuracyStatus.STOPPED, ""
-        rows = [pd.DataFrame(), *(r.values.assign(round=k, **r.record) for k, r in enumerate(self.rounds, 1))]
-        history = pd.concat(rows[1:] or rows, ignore_index=True), tuple(r.result.surface for r in self.rounds)
         if not self.rounds:
-            return AccurateResult(status, first, None, pd.DataFrame(), *history, detail)
-        last = self.rounds[-1]
-        return AccurateResult(status, last.result, last.check, last.values, *history, detail)
+            return AccurateResult(status, first, None, pd.DataFrame(), pd.DataFrame(), (), detail)
+        last, rows = (
+            self.rounds[-1],
+            [r.values.assign(round=k, **r.record) for k, r in enumerate(self.rounds, 1)],
+        )
+        history, surfaces = pd.concat(rows, ignore_index=True), tuple(r.result.surface for r in self.rounds)
+        return AccurateResult(status, last.result, last.check, last.values, history, surfaces, detail)
 
     def _round(self, result: Result) -> _Round:
         """Check the mesh of a surface at rest; bars have what the first mesh's curves leave in doubt, too."""
         first = self.rounds[0].check if self.rounds else None
         given = self.given if first is None else {"boundary": self.project or "polygon"}
         check = check_mesh(result, **given)
-        goals, doubts = goals_in(check.table, self.wanted), first.curve_doubts if first else {}
-        most = [[max([0.0, *(d for (q, _), d in doubts.items() if q == quantity)])] for quantity, _ in goals]
+        goals, doubts = goals_in(check.table, self.wanted), dict[str, float]()  # the largest by quantity
+        for (quantity, _), doubt in (first.curve_doubts if first else {}).items():
+            doubts[quantity] = max(doubt, doubts.get(quantity, 0.0))
         names = list(zip(check.table["quantity"], check.table["of"], strict=True))
         rows = check.table.iloc[[names.index(goal) for goal in goals]].reset_index(drop=True)
         values = rows.assign(accuracy=list(goals.values()))
-        values[["error", "limit_error"]] += np.array(most)
+        values[["error", "limit_error"]] += np.array([[doubts.get(quantity, 0.0)] for quantity, _ in goals])
         bar = values["error" if self.accuracy_of == "mesh" else "limit_error"]
         excess = float((bar / values["accuracy"]).max())
         record = {"triangles": result.surface.m, "verdict": check.verdict.name.lower()}
@@ -335,8 +340,10 @@ class _Search:
 
     def _next(self, here: _Round) -> Result:
         """The surface on a mesh with equal shares of the error; if it does not come to rest there, on the
-        check's finer mesh. With equal shares N triangles have the error (Σ √η)² / N, the m triangles here
-        have Σ η."""
+        check's finer mesh.
+
+        With equal shares N triangles have the error (Σ √η)² / N, the m triangles here have Σ η.
+        """
         surface, finer = here.result.surface, here.check.surfaces[1:2]
         if finer:
             shares = error_shares(surface, finer[0], here.goals)

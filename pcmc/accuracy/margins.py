@@ -87,8 +87,10 @@ def find_end(
     surface: Surface, varied: Varied, index: int, most: float, callback: Callback | None = None
 ) -> End:
     """Follow the equilibria of a surface of this index until it rises, λ turns, or a part is compressed.
+
     Where the contact with Π changes on the last step, too, that is repeated in smaller ones, which tell the
-    two apart. Raises KeyboardInterrupt where ``callback`` raises StopIteration, or for Ctrl-C."""
+    two apart. Raises KeyboardInterrupt where ``callback`` raises StopIteration, or for Ctrl-C.
+    """
     sense, contacts = (1.0 if varied.more else -1.0), list[float]()
     branch, step = _follow(surface, varied, index, most, callback, LARGEST), LARGEST
     while True:
@@ -155,10 +157,13 @@ def _compression(branch: Branch) -> float | None:
     """λ at which α + w z̄ of a triangle or τ + g z̄ of a cable reaches 0, linear between the last two points;
     None if none does."""
     parameters, surfaces = branch.points.parameter.tolist()[-2:], [*branch.surfaces.values()][-2:]
-    ends = list[float]()
-    for pulls in HEAVY if len(branch.points) > 1 else ():
+    if len(parameters) < 2:
+        return None
+    ends = []
+    for pulls in HEAVY:
         before, after = (pulls(surface).min(initial=np.inf) for surface in surfaces)
-        ends += [float(np.interp(0.0, [after, before], parameters[::-1]))] if after <= 0.0 else []
+        if after <= 0.0:
+            ends.append(float(np.interp(0.0, [after, before], parameters[::-1])))
     return min(ends, key=lambda end: abs(end - parameters[0]), default=None)
 
 
@@ -310,11 +315,22 @@ def margin(
     if certificate.symmetric_in:
         notes.append(f"among shapes symmetric in {', '.join(certificate.symmetric_in)}")
     kinds = {dimension_of(kind) for kind, _ in varied.parts}
-    factor, dimension = math.nan if varied.unit else end.factor, kinds.pop() if len(kinds) == 1 else ""
-    bar, limit, limit_bar = (float(value[0]) for value in (bars.error, bars.limit, bars.limit_error))
-    about = varied.what, varied.more, factor, varied.at(end.factor), bar, limit, limit_bar, end.ends_by
-    detail = "; ".join(filter(None, (end.detail, *notes)))
-    return Margin(*about, detail, end.surface, mode, _where(end, mode), index, dimension)
+    return Margin(
+        what=varied.what,
+        more=varied.more,
+        factor=math.nan if varied.unit else end.factor,
+        values=varied.at(end.factor),
+        bar=float(bars.error[0]),
+        limit=float(bars.limit[0]),
+        limit_bar=float(bars.limit_error[0]),
+        ends_by=end.ends_by,
+        detail="; ".join(filter(None, (end.detail, *notes))),
+        surface=end.surface,
+        mode=mode,
+        where=_where(end, mode),
+        index=index,
+        dimension=kinds.pop() if len(kinds) == 1 else "",
+    )
 
 
 def _mode(end: End, index: int) -> Floats:
@@ -338,7 +354,7 @@ def _where(end: End, mode: Floats) -> str:
         vectors, areas = vertex_area_vectors(surface.vertices, surface.faces[surface.patch_of_face == k])
         through[k], size[k] = (mode * vectors).sum(), motion @ areas
     near = np.unique(surface.patch_of_face[(surface.faces == most).any(axis=1)])
-    largest = int(size.argmax()) if size.any() else int([*roof, near[0]][0])
+    largest = int(roof[size[roof].argmax()]) if len(roof) else int(near[0])
     turns = end.ends_by is MarginEnd.BIFURCATION  # to either side
     if abs(through[largest]) >= INFLATES * size[largest] > 0.0 and not (turns and len(near) > 1):
         part = "the roof" if len(roof) == 1 else repr(surface.patches[largest].name)

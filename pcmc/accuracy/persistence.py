@@ -55,8 +55,10 @@ class Finding(NamedTuple):
 
 
 def lost(start: Surface, result: Result) -> Finding:
-    """The finding where the solver reaches no equilibrium from the start on a finer mesh. The place is that
-    of the start: where the solver ends, a surface may be far away."""
+    """The finding where the solver reaches no equilibrium from the start on a finer mesh.
+
+    The place is that of the start: where the solver ends, a surface may be far away.
+    """
     surface = result.surface
     worst, quality = worst_face(surface, standing_part(surface).walls.pinchable)
     if result.status in RUNNING_AWAY:
@@ -91,18 +93,21 @@ def compared(surfaces: Sequence[Surface], certificates: Sequence[Certificate]) -
             reason = f"on {fine.m} triangles it is another shape, {far:.3g} away"
             return _at(MeshVerdict.CHANGES, surface, reason, place)
     if _order(surfaces, moves) < 0.0:
-        moved = "by {:.2g}, then {:.2g} in the mean".format(*map(_mean, moves[-2:]))
+        before, last = (_mean(move) for move in moves[-2:])
+        moved = f"by {before:.2g}, then {last:.2g} in the mean"
         reason = f"each finer surface is farther from the last one ({moved}), most"
         return _at(MeshVerdict.HELD_BY_MESH, surfaces[-1], reason, surfaces[-2].vertices[moves[-1].argmax()])
     return _falling_line(surfaces) or _stability(surfaces, certificates)
 
 
 def shape_order(surfaces: Sequence[Surface]) -> float:
-    """Observed order of the surface itself: log2 of the last two mean moves from mesh to mesh. Infinite with
-    fewer than three meshes, or where the last move is none beside the error of the shape: a coarse mesh may
-    be at rest on the smooth surface itself, so that first moves are small and later ones larger. The error is
-    how far the last refinement's new vertices are from the middles of their edges. At most 3/2 where a
-    junction rests on its bottom, or will on finer meshes: that where its rest ends."""
+    """Observed order of the surface itself: log2 of the last two mean moves from mesh to mesh.
+
+    Infinite with fewer than three meshes, or where the last move is none beside the error of the shape: a
+    coarse mesh may be at rest on the smooth surface itself, so that first moves are small and later ones
+    larger. The error is how far the last refinement's new vertices are from the middles of their edges.
+    At most 3/2 where a junction rests on its bottom, or will on finer meshes: that where its rest ends.
+    """
     order = _order(surfaces, [_moves(a, b) for a, b in pairwise(surfaces[-3:])])
     if len(surfaces) < 3 or surfaces[0].periodic:
         return order
@@ -145,9 +150,11 @@ def _moves(coarse: Surface, fine: Surface) -> Floats:
 
 
 def _falling_line(surfaces: Sequence[Surface]) -> Finding | None:
-    """The finding where a line in which walls meet leans ever more at its foot: it will lie down. At its foot
-    the walls are planes through their bottoms and the line, and must balance. With all bottoms on one side of
-    a straight line, as in a T, they cannot: each finer mesh sees it lean more, by about as much."""
+    """The finding where a line in which walls meet leans ever more at its foot: it will lie down.
+
+    At its foot the walls are planes through their bottoms and the line, and must balance. With all bottoms on
+    one side of a straight line, as in a T, they cannot: each finer mesh sees it lean more, by about as much.
+    """
     if len(surfaces) < 3:
         return None
     leans = np.zeros((len(surfaces), surfaces[0].n))  # degrees from Π's normal at the feet

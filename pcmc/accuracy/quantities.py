@@ -40,10 +40,12 @@ class Reading:
 
 
 def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[Key, Reading]:
-    """The quantities of a surface. Keys are the same for all refinements of one surface. All supports
-    together carry the loads in the limit; on a mesh forces within the sheets, which move no vertex, keep a
-    part that comes and goes from mesh to mesh. So the loads are the estimate of the reaction. ``vertices`` is
-    the number of vertices of the coarsest mesh, which come first in all finer ones."""
+    """The quantities of a surface. Keys are the same for all refinements of one surface.
+
+    All supports together carry the loads in the limit; on a mesh forces within the sheets, which move no
+    vertex, keep a part that comes and goes from mesh to mesh. So the loads are the estimate of the reaction.
+    ``vertices`` is the number of vertices of the coarsest mesh, which come first in all finer ones.
+    """
     share, areas = ROUNDING + RESIDUALS * certificate.residual, certificate.patches["area"].to_numpy()
     size, tension, whole = surface.size, float(surface.tensions.max()), float(areas.sum())
     found: dict[Key, Reading] = {}
@@ -106,9 +108,11 @@ def given_volume(surface: Surface) -> float | None:
 
 
 def _boundaries(surface: Surface, certificate: Certificate) -> Iterator[tuple[EdgeCurve, str, Floats, float]]:
-    """Each held boundary curve, its name, its reaction (3,) and the largest one per length. Of several curves
-    of one name, each is named with its place; those around one centre with the number of their support,
-    too."""
+    """Each held boundary curve, its name, its reaction (3,) and the largest one per length.
+
+    Of several curves of one name, each is named with its place; those around one centre with the number of
+    their support, too.
+    """
     curves = held_curves(surface)
     table = certificate.boundaries.iloc[: len(curves)]  # the first of the supports
     numbers = certificate.supports["support"].iloc[: len(curves)]
@@ -121,10 +125,12 @@ def _boundaries(surface: Surface, certificate: Certificate) -> Iterator[tuple[Ed
 
 
 def _height(surface: Surface, patch: int, rounding: float) -> tuple[float, float, float]:
-    """Height of a patch's ``summit`` over Π, ``rounding``, and the height of the smooth surface through the
-    vertices there. The highest vertex is up to half an edge beside the top, at random from mesh to mesh. The
-    paraboloid through it and its neighbours, or on a junction the parabola, has its top at the surface's own.
-    In a mirror plane the images of its neighbours belong to them."""
+    """Height of a patch's ``summit`` over Π, ``rounding``, and that of the smooth surface through it.
+
+    The highest vertex is up to half an edge beside the top, at random from mesh to mesh. The paraboloid
+    through it and its neighbours, or on a junction the parabola, has its top at the surface's own. In a
+    mirror plane the images of its neighbours belong to them.
+    """
     local, topo = surface.plane.to_local(surface.vertices), surface.topology
     top, side = summit(surface, patch)
     value, on_junction = float(local[top, 2]), topo.on_junction[top]

@@ -35,7 +35,8 @@ class Varied:
         known = named(surface)
         parts = known[validate.choice("what", what, [*known])]
         walls = [surface.patches[k].name for k in np.flatnonzero(surface.walls)]
-        more = all(kind not in ("cable", "tension") or name in walls for kind, name in parts)
+        pulls = any(kind == "cable" or (kind == "tension" and name not in walls) for kind, name in parts)
+        more = not pulls
         if towards is not None:
             more = validate.choice("towards", towards, ("more", "less")) == "more"
         values = np.array([Parameter(name, kind).value(surface) for kind, name in parts])

@@ -144,7 +144,6 @@ def improved(plan: Plan, certificate: Certificate) -> Plan:
 
 def _stiffer(plan: Plan, certificate: Certificate) -> Plan:
     """All tensions at least at those with which a first roof succeeds, and well beyond a fold."""
-
     least = ABOVE_LEAST * least_tension(plan_area(plan), max(map(abs, net_pressures(plan).values())))
     folds = [1.0 / a.value for a in certificate.tried if a.folds and a.way not in NO_LOADS and a.value]
     factor = BEYOND_FOLD * max((fold for fold in folds if fold < FARTHEST), default=0.0)
@@ -204,7 +203,6 @@ def _scaled(plan: Plan, factor: float) -> Plan:
 
 def with_upright(plan: Plan) -> Plan | None:
     """The plan with all walls upright that can be, those under straight lines; None if they are already."""
-
     near, walls = SNAP * plan.edge_length, [d for d in plan.dividers if d.wall is not None and not d.upright]
     leaning = {d.name for d in walls if is_straight(d.curve.local(plan.plane), near)}
     return with_dividers(plan, leaning, upright=True) if leaning else None

@@ -102,10 +102,9 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
     targets, vary = [], []
     for rise in rises:
         if rise.kind != "apex" and np.ptp(heights) > ON * plan.outline.length:
-            text = (
-                f"{rise.kind}: the outline is not level, so a rise over it is not defined; give apex instead,"
-            )
-            raise OptionError(f"{text} the greatest height over the plane", what=rise.kind, where=rise.patch)
+            text = f"{rise.kind}: the outline is not level, so a rise over it is not defined; give apex"
+            text += " instead, the greatest height over the plane"
+            raise OptionError(text, what=rise.kind, where=rise.patch)
         over = rise.value if rise.kind != "span_ratio" else span / rise.value
         height = rise.value if rise.kind == "apex" else level + over
         if height - lowest <= ON * plan.outline.length:
@@ -238,7 +237,6 @@ def point_masts(plan: Plan) -> list[Mast]:
 
 def _dome(plan: Plan) -> float:
     """The height to which pressure lifts the middle of a plan, about: of the flattest cap over its circle."""
-
     loads, tensions = net_pressures(plan).values(), [area.tension for area in plan.patches]
     if min(loads) <= 0.0:
         return 0.0

@@ -275,10 +275,8 @@ def pressures_left_over(surface: Surface) -> str:
     at = (surface.topology.edge_of_face == edges[0]).any(axis=1)
     names = " | ".join(surface.patches[k].name for k in np.unique(surface.patch_of_face[at]))
     place = point_text(surface.vertices[surface.topology.edges[edges[0]]].mean(axis=0), surface.size)
-    text = f"along {len(edges)} edges that nothing holds ({names} near {place}) the pressures do not cancel:"
-    text += (
-        f" {abs(surface.uncancelled[edges[0]]):.3g} is left over and acts from there to the point of Π, so"
-    )
     return (
-        f"{text} the shape depends on that point; give a wall the pressure of one room less that of the other"
+        f"along {len(edges)} edges that nothing holds ({names} near {place}) the pressures do not cancel:"
+        f" {abs(surface.uncancelled[edges[0]]):.3g} is left over and acts from there to the point of Π, so"
+        " the shape depends on that point; give a wall the pressure of one room less that of the other"
     )

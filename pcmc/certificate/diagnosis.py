@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -34,6 +35,7 @@ class Neck:
 
     @property
     def ratio(self) -> float:
+        """The girth over that length."""
         return self.girth / self.curve
 
     def __str__(self) -> str:
@@ -233,22 +235,29 @@ def _slips(surface: Surface, pinchable: Bools, place: Floats, reach: float) -> b
     return False
 
 
-def slipping_ends(surface: Surface, mode: Floats) -> list[tuple[EdgeCurve, int, float]]:
-    """The fixed ends of junctions next to which a mode (n,3) moves almost as far as anywhere: the junction,
-    the end, and the motion at the next vertex over the largest, which orders them.
+class SlippingEnd(NamedTuple):
+    """A fixed end of a junction next to which a mode moves almost as far as anywhere.
 
     A mode that the end holds rises from 0 along the junction, to about π h / L after an edge h of the length
     L; one that slips jumps, whatever the mesh, and only the triangles at the end hold it.
     """
+
+    junction: EdgeCurve
+    vertex: int
+    share: float  # the mode's motion at the junction's next vertex over its largest motion
+
+
+def slipping_ends(surface: Surface, mode: Floats) -> list[SlippingEnd]:
+    """The fixed ends of junctions that slip in a mode (n,3), the one that slips most first."""
     motion = np.linalg.norm(mode, axis=1)
     largest = float(motion.max(initial=0.0))
     ends = [
-        (curve, end, float(motion[beside] / largest))
+        SlippingEnd(curve, end, float(motion[beside] / largest))
         for curve in surface.topology.junctions
         for end, beside in curve.ends
         if surface.pinned[end] and motion[beside] >= SLIPS * largest > 0.0
     ]
-    return sorted(ends, key=lambda found: -round(found[2], ALIKE))  # of equal ones the first of the mesh
+    return sorted(ends, key=lambda end: -round(end.share, ALIKE))  # of equal ones the first of the mesh
 
 
 def slipping_rings(surface: Surface, mode: Floats) -> list[str]:
@@ -285,11 +294,11 @@ def describe_saddle(surface: Surface, index: int, mode: Floats) -> str:
     ends = slipping_ends(surface, mode)
     if not ends:
         return text
-    junctions = " and of ".join(dict.fromkeys(names_of(surface, curve.sheets) for curve, _, _ in ends))
-    places = " and ".join(point_text(surface.vertices[end], surface.size) for _, end, _ in ends[:4])
-    below = dict.fromkeys(i for curve, _, _ in ends for i in curve.sheets if surface.walls[i])
+    junctions = " and of ".join(dict.fromkeys(names_of(surface, end.junction.sheets) for end in ends))
+    places = " and ".join(point_text(surface.vertices[end.vertex], surface.size) for end in ends[:4])
+    below = dict.fromkeys(i for end in ends for i in end.junction.sheets if surface.walls[i])
     walls = " and of ".join(repr(surface.patches[i].name) for i in below)
     advice = f"hold the bottom of {walls} ({KEY.format('held')})" if walls else "put a wall below it"
     which, verb = ("end", "slips") if len(ends) == 1 else ("ends", "slip")
     text += f"; the {which} of {junctions} at {places} {verb}: one edge away the junction moves"
-    return f"{text} {ends[0][2]:.2f} as far, so only the mesh holds it there; {advice}"
+    return f"{text} {ends[0].share:.2f} as far, so only the mesh holds it there; {advice}"

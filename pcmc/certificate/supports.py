@@ -100,7 +100,7 @@ def boundary_shares(acting: Forces, name: str) -> tuple[Floats, Ints]:
     With the share s the table's force is Σ s f + Σ ½ L (δ - s) q over the vertices, and over the ends of the
     edges of length L under the pulls q; δ is 1 on its own edges. Without that name it is the whole boundary.
     """
-    parts, taken = next(_sources(acting))[1], np.zeros((2, acting.surface.n))
+    (_, parts, _), taken = next(_sources(acting)), np.zeros((2, acting.surface.n))  # the boundary comes first
     chosen = [part for part in parts if part.name == name] or parts
     for row, some in enumerate((chosen, parts)):
         for part in some:

@@ -148,11 +148,10 @@ def _proved(surface: Surface) -> Theorem:
     step = (float(np.sqrt((newton * newton).sum())) + beta * found.left_after(newton)) * SAFE
     first = 2.0 * step
     if not first <= MOST * height:
-        text = (
+        raise _Unproved(
             f"the forces left, {found.residual:.1e}, may move it by {first:.1e}: too far beside its thinnest"
+            f" triangle, of height {height:.1e}; solve to a smaller tolerance, or improve the mesh"
         )
-        text += f" triangle, of height {height:.1e}; solve to a smaller tolerance, or improve the mesh"
-        raise _Unproved(text)
     reach = max(REACH * height, first)
     rate = found.lipschitz(reach)
     h = beta * rate * step * SAFE

@@ -21,7 +21,7 @@ from .cables import too_long, weak_cable
 from .diagnosis import Neck, describe_saddle, held_wall_down, pinched_neck, where_collapsed
 from .proof import Attempt, Overload, Proof
 
-SLACK = "no patch has a tension: every shape is at rest"
+NO_TENSION = "no patch has a tension: every shape is at rest"
 FACTOR = 1e6  # between two tensions: from here it may be why a second variation is singular
 
 
@@ -95,6 +95,7 @@ class Findings:
 
     @property
     def folds(self) -> list[Attempt]:
+        """The attempts whose branch of equilibria folds before it arrives."""
         return [attempt for attempt in self.tried if attempt.folds]
 
     @property
@@ -215,9 +216,9 @@ def _compressed(f: Findings) -> str:
     worst = pulls.argmin()
     name = surface.patches[surface.patch_of_face[worst]].name
     place = point_text(surface.vertices[surface.faces[worst]].mean(axis=0), surface.size)
-    text = f"patch {name!r} is under compression in {len(faces)} triangles: its weight leaves α + w z ="
     return (
-        f"{text} {pulls.min():.3g} at {place}, and a sheet buckles there; raise its tension, or put Π lower"
+        f"patch {name!r} is under compression in {len(faces)} triangles: its weight leaves α + w z ="
+        f" {pulls.min():.3g} at {place}, and a sheet buckles there; raise its tension, or put Π lower"
     )
 
 
@@ -243,7 +244,7 @@ def _near_fold(f: Findings) -> str:
 
 # a verdict, when it applies, and the reason, or its parts
 RULES: tuple[tuple[Verdict, Callable[[Findings], object], Callable[[Findings], str | list[object]]], ...] = (
-    (Verdict.NEUTRAL, lambda f: not f.surface.tensions.any(), lambda f: SLACK),
+    (Verdict.NEUTRAL, lambda f: not f.surface.tensions.any(), lambda f: NO_TENSION),
     (Verdict.NO_EQUILIBRIUM, lambda f: f.proofs, lambda f: [*f.proofs, *f.folds, f.neck]),
     (Verdict.NONE_FOUND, lambda f: f.lost and f.tried, _none_found),
     (Verdict.RAN_AWAY, lambda f: f.lost, _ran_away),

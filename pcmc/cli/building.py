@@ -93,7 +93,7 @@ def panels_(
         if pattern is None or size is None:
             text = "--pattern: needs a --size, and --size a --pattern: planar-quads, quads or hexagons"
             raise OptionError(text, what="--size", expected="a length")
-        return _net(file, files, picture, seen, build, (size, pattern, direction, units, sheet))
+        return _net(file, units, files, picture, seen, sheet, build, (size, pattern, direction))
     if tolerance is None:
         text = "--tolerance: panels of triangles need it; quads and hexagons need --pattern and --size"
         raise OptionError(text, what="--tolerance", expected="a length")
@@ -144,11 +144,18 @@ def panels_(
 
 
 def _net(
-    file: Path, files: list[Path], picture: Path | None, seen: Any, build: Build, about: tuple[Any, ...]
+    file: Path,
+    units: str,
+    files: list[Path],
+    picture: Path | None,
+    seen: Any,
+    sheet: str | None,
+    build: Build,
+    wanted: tuple[float, str, float],
 ) -> int:
     for path in files:
         suffix_of(path, NET_SUFFIXES, "a net of panels")
-    size, pattern, direction, units, sheet = about
+    size, pattern, direction = wanted
     check_grid(pattern, direction)
     outputs = Output(picture=picture, view=seen, sheet=sheet or "A1").paths
     outputs += [one for path in files for one in table_paths(path, NET_TABLES)]
@@ -186,9 +193,10 @@ def draw_(
       pcmc draw roof.pcmc --units m --tolerance 0.005 --panel-sheets --sheet A0 -o roof.dxf
     """
     arguments.output_of(file, drawings=output)
+    heights = None if height is None else [parsed_number(text) for text in height]
     points = [arguments.numbers(text, "--line", FOUR, 4) for text in line or ()]
-    options: dict[str, Any] = {"scale": scale, "heights": height and [parsed_number(text) for text in height]}
-    options["lines"] = line and [((a, b), (c, d)) for a, b, c, d in points]
+    lines = None if line is None else [((a, b), (c, d)) for a, b, c, d in points]
+    options: dict[str, Any] = {"scale": scale, "heights": heights, "lines": lines}
     with working() as progress:
         roof = build.roof(arguments.load_project(file, units), progress)
         progress("drawing")
@@ -382,14 +390,15 @@ def pattern(
     arguments.output_of(file, pattern=files, picture=picture, view=seen)
     with working() as progress:
         project = arguments.load_project(file, units)
-        wanted, sheet = given.of(project.pattern), sheet or project.output.sheet
+        wanted, own = given.of(project.pattern), project.output
+        own = replace(own, pattern=files, sheet=sheet or own.sheet)
         start = projects.start_of(project)
-        replace(project.output, pattern=files).check(start.units, project.structure, wanted)
+        own.check(start.units, project.structure, wanted)
         of_material(wanted, project.structure, start.surface)
         roof = build.roof(project, progress)
         progress("cutting strips")
         cloth = roof.cutting_pattern(wanted, build.allow_uncertified)
-        jobs: list[Any] = pattern_files(cloth, files, roof.units, sheet, roof.name, roof.mark)
+        jobs: list[Any] = pattern_files(cloth, files, roof.units, own.sheet, roof.name, roof.mark)
         if picture is not None:
             jobs.append((picture, partial(strains, cloth, view=seen)))
         written = write_all(jobs, progress)

@@ -119,7 +119,6 @@ def explore(
       pcmc explore roof.toml --watch
       pcmc explore --example two_caps --set edge_length=1.2
     """
-
     if (file is None) == (example is None):
         raise OptionError("explore: give a file or --example, one of them", what="--example")
     needs: dict[str, Any] = {"--watch": (watch, file, "a file"), "--start": (start_shape, file, "a file")}
@@ -149,7 +148,6 @@ def explore(
 
 
 def _example(name: str, parameters: dict[str, Any]) -> Surface:
-
     try:
         known: Any = [name] if ":" in name else resolve("generators:__all__")
         if name not in known:

@@ -52,7 +52,6 @@ def equilibria_(
       pcmc equilibria roof.toml -o diagram.svg
       pcmc equilibria roof.toml --along pressure --along "tension of hall" -o table.csv -o roof.pcmc
     """
-
     files = output or []
     surfaces = [path for path in files if path.suffix.lower() not in (*PICTURES, TABLE)]
     projects.Output(files=surfaces)  # refuses an unknown format

@@ -252,7 +252,6 @@ def sweep(
       pcmc sweep roof.toml corner.tension=6,6.2 "wall 1.tension=1,2" --csv roof.csv
       pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
-
     inputs = files_of(what) if Path(what).exists() else ()
     check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)
     if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet":
@@ -297,7 +296,6 @@ def sweep(
 
 def _cases(what: str, values: list[str], method: str | None, options: dict[str, bool]) -> Sweep:
     """Every combination of the values, each NAME=V1,V2,...; a name with one value is the same in all."""
-
     given: dict[str, list[Any]] = {}
     for name, listed in map(arguments.named_values, values):
         if name in given:

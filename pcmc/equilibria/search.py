@@ -28,8 +28,11 @@ from .shapes import Shape
 
 MODES = 8  # of the lowest modes a start is displaced along
 FAR = (0.05, 0.3)  # of the size: how far a start is displaced
-ENDS = {Status.DIVERGED: "inflates without bound", Status.VANISHED: "shrinks to nothing"}
-ENDS |= {Status.DEGENERATE: "pinches off or collapses"}
+ENDS = {
+    Status.DIVERGED: "inflates without bound",
+    Status.VANISHED: "shrinks to nothing",
+    Status.DEGENERATE: "pinches off or collapses",
+}
 
 Along = str | Direction | BoundaryMotion
 
@@ -291,8 +294,9 @@ class _Search:
                 surface, status = way_down(one.surface, side)
                 if status is Status.STOPPED:
                     raise KeyboardInterrupt
-                arrived, how = status is Status.CONVERGED, "on the way down from a saddle"
-                to = self.add(with_good_triangles(surface), how) if arrived else None
+                to = None
+                if status is Status.CONVERGED:
+                    to = self.add(with_good_triangles(surface), "on the way down from a saddle")
                 end = "" if to is not None else ENDS.get(status, f"no minimum ({status.name.lower()})")
                 ends.append(end)
                 if one.index == 1:
@@ -343,6 +347,12 @@ class _Search:
             for line, branches in every
         ]
         searched.append(f"Deflated Newton: {self.starts} starts, {self.arrived} came to rest.")
-        down, branches = sorted(ways, key=lambda way: way.saddle), {line.name: tuple(b) for line, b in every}
-        known = tuple(self.found[k] for k in order), tuple(down), tuple(self.lines), branches
-        return Equilibria(*known, tuple(searched), tuple(dict.fromkeys(self.failed)), self.stopped)
+        return Equilibria(
+            found=tuple(self.found[k] for k in order),
+            ways=tuple(sorted(ways, key=lambda way: way.saddle)),
+            lines=tuple(self.lines),
+            branches={line.name: tuple(branches) for line, branches in every},
+            searched=tuple(searched),
+            failed=tuple(dict.fromkeys(self.failed)),
+            stopped=self.stopped,
+        )

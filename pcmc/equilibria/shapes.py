@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Floats, Ints
+from ..base.errors import SurfaceError
 from ..forces.pinching import standing_part
 from ..surface import Surface, expect_surface
 from ..surface.distance import distances
@@ -76,6 +77,8 @@ def shape_distance(one: Surface, other: Surface) -> float:
     >>> round(shape_distance(one, one.moved(one.vertices + [0.0, 0.0, 0.5])), 12)
     0.5
     """
-    for surface in (one, other):
+    for name, surface in (("one", one), ("other", other)):
         expect_surface(surface)
+        if not Shape.of(surface).area.any():
+            raise SurfaceError(f"shape_distance: surface {name!r} has no area", what=name, found=0.0)
     return Shape.of(one).distance(Shape.of(other))

@@ -29,9 +29,10 @@ class WallRows:
 
     With X_i, X_j the ends of a top edge, P = (1 - λ) X_i + λ X_j, n the normal of Π and z the height over it,
 
-        P + (ρ - 1) D + |D| o,   D = z(P) n
+        P + (ρ - 1) D + z(P) o,   D = z(P) n
 
-    is the place of a vertex; where the bottom is held, D = P - Q, Q between the held vertices below i and j.
+    is the place of a vertex; where the bottom is held, D = P - Q, Q between the held vertices below i and j,
+    and |D| stands for z(P) in front of o.
     """
 
     vertices: Ints  # (w,) their indices
@@ -51,8 +52,13 @@ class WallRows:
     def places(self, surface: Surface, X: Floats) -> Floats:
         """(w,3) where the rows lie, with the top edges at X (n,3)."""
         drop = self.drops(surface, X)
-        aside = np.linalg.norm(drop, axis=1)[:, None] * self.offset
+        aside = self.heights(surface, drop)[:, None] * self.offset
         return np.asarray(self.top_places(X) + (self.relative_height[:, None] - 1.0) * drop + aside)
+
+    def heights(self, surface: Surface, drop: Floats) -> Floats:
+        """(w,) |D| of D (w,3); over a sliding bottom z(P), < 0 below Π, so that places are linear in X."""
+        held = self.feet[:, 0] >= 0
+        return np.where(held, np.linalg.norm(drop, axis=1), drop @ np.array(surface.plane.normal))
 
     def drops(self, surface: Surface, X: Floats) -> Floats:
         """(w,3) D, from the bottom up to the top edge."""
@@ -90,9 +96,9 @@ def wall_rows(
         feet, bottom = foot[ends], surface.pinned
     rows = WallRows(vertices, ends, fraction, zero, none, feet)
     drop = rows.drops(surface, X)
-    top = np.linalg.norm(drop, axis=1)
+    top = rows.heights(surface, drop)
     share = np.einsum("ij,ij->i", X[vertices] - rows.places(surface, X), drop)
-    stands = top > ON * surface.size
+    stands = np.abs(top) > ON * surface.size
     relative = np.clip(np.divide(share, top**2, out=zero.copy(), where=stands), 0.0, 1.0)
     if not stands.all():  # steps to the foot, over those to the foot and to the top
         inner = np.zeros(surface.n, dtype=bool)

@@ -193,13 +193,12 @@ def _warn_of_free_edges(draft: Draft, held: Bools) -> None:
 def _cables(draft: Draft, held: Bools) -> list[Cable]:
     numbers = count(1)
     cables = edge_cables(draft.edges, held, numbers)
-    for number, d in enumerate(draft.plan.dividers):
-        if d.cable is not None:
-            named = d.wall is None and not d.name.startswith("divider ")
+    for number, divider in enumerate(draft.plan.dividers):
+        if divider.cable is not None:
+            named = divider.wall is None and not divider.name.startswith("divider ")
+            name = divider.name if named else f"cable {next(numbers)}"
             along = np.concatenate([chain.edges for chain in draft.divider(number)[1]])
-            cables.append(
-                Cable(d.name if named else f"cable {next(numbers)}", d.cable, along, d.cable_weight)
-            )
+            cables.append(Cable(name, divider.cable, along, divider.cable_weight))
     return cables
 
 

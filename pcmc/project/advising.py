@@ -69,9 +69,8 @@ def advice(project: Project, given: Surface, start: Surface, outcome: Outcome) -
     if project.drawing is not None and mended.rings:
         where = f"draw in {project.drawing.path.name}" + (f" and {where}" if lines else "")
     ending = [f"with them, the targets are {reached}"] if reached else []
-    causes = ["edges that nothing holds"] * mended.sail + ["a roof held at a single point"] * bool(
-        mended.rings
-    )
+    causes = ["edges that nothing holds"] if mended.sail else []
+    causes += ["a roof held at a single point"] if mended.rings else []
     cause = f"the cause is {' and '.join(causes)}; " if causes else ""
     return [f"{cause}{where}, {tried}:", *lines, *mended.rings, *ending]
 

@@ -118,7 +118,6 @@ def drawing_of(path: Path, units: str, gap: float | None) -> Drawing:
 
 @lru_cache(maxsize=8)  # a sweep loads its project for each case
 def _read(path: Path, units: str, gap: float | None, time: int, size: int) -> Drawing:
-
     drawing = read_drawing(path, units, gap)
     unknown = drawing.units not in ("", *LENGTHS)
     return read_drawing(path, FALLBACK, gap) if unknown else drawing

@@ -68,12 +68,8 @@ class Project:
 
     def __post_init__(self) -> None:
         order, output = self.options.get("order"), self.output
-        flat: dict[str, Any] = {
-            "accuracy": self.wanted.accuracy,
-            "margin": self.margin,
-            "verify": self.verify,
-        }
-        flat = {f"solve.{key}": wanted for key, wanted in flat.items()}
+        flat: dict[str, Any] = {"solve.accuracy": self.wanted.accuracy, "solve.margin": self.margin}
+        flat["solve.verify"] = self.verify
         flat |= {f"output.{key}": getattr(output, key) for key in ("net", "structure", "tolerance")}
         flat |= {"pattern": self.pattern, "structure.run": self.structure is not None and self.structure.run}
         for key in (key for key, wanted in flat.items() if wanted and order not in (None, 1)):
@@ -313,7 +309,6 @@ def _output(table: Mapping[str, Any]) -> Output:
 
 
 def _search(table: Mapping[str, Any], plan: Plan | None) -> tuple[list[Target], list[Parameter]]:
-
     if "tolerance" in table:
         validate.positive("targets.tolerance", table["tolerance"])
     for key in ("meet", "vary"):
@@ -334,14 +329,16 @@ def _search(table: Mapping[str, Any], plan: Plan | None) -> tuple[list[Target], 
 def _check_sought_once(rises: Sequence[Rise], vary: Sequence[Parameter], plan: Plan) -> None:
     for rise in rises:
         own = ([area.name for area in plan.patches] or ["patch 1"]) if rise.patch is None else [rise.patch]
-        for both in (n for p in vary if p.kind == "tension" for n in p.names if n in own):
-            left = [(p, [n for n in p.names if p.kind != "tension" or n not in own]) for p in vary]
-            others = [replace(parameter, patch=names).plain for parameter, names in left if names]
-            change = f"type vary = {toml(others)}" if others else "remove vary and its targets"
-            where = "[plan]" if rise.patch is None else f"patch {rise.patch!r}"
-            text = f"targets.vary: the tension of {both!r} is found for the {rise.kind} of {where}, too;"
-            text += f" {change}, or give {where} tension = instead of {rise.kind} ="
-            raise OptionError(text, what="targets.vary", where=both, found=both)
+        both = [n for parameter in vary if parameter.kind == "tension" for n in parameter.names if n in own]
+        if not both:
+            continue
+        left = [(p, [n for n in p.names if p.kind != "tension" or n not in own]) for p in vary]
+        others = [replace(parameter, patch=names).plain for parameter, names in left if names]
+        change = f"type vary = {toml(others)}" if others else "remove vary and its targets"
+        where = "[plan]" if rise.patch is None else f"patch {rise.patch!r}"
+        text = f"targets.vary: the tension of {both[0]!r} is found for the {rise.kind} of {where}, too;"
+        text += f" {change}, or give {where} tension = instead of {rise.kind} ="
+        raise OptionError(text, what="targets.vary", where=both[0], found=both[0])
 
 
 def with_rise(project: Project, wanted: Mapping[str, float | None]) -> Project:

@@ -278,7 +278,6 @@ def solve_section(method: str) -> Section:
 @cache
 def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
-
     wanted = _of_class(Target, quantity=(*MEASURES, *SHORT), of="a name or a point [x, y]")
     changing = _of_class(Parameter, patch="a name or a list of names", kind=KINDS_OF_PARAMETER)
     meet = Key("meet", "a list of tables", REQUIRED, "the quantities and their values")

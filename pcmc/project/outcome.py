@@ -143,13 +143,11 @@ class Outcome:
     @property
     def figures(self) -> list[Figure]:
         """The key figures of what is shown."""
-
         return self._once("figures", lambda: figures(*self.shown))
 
     @property
     def theorem(self) -> Theorem:
         """What ``pcmc.verify`` proves of what is shown."""
-
         return self._once("theorem", lambda: verify(self.shown.surface))
 
     @property
@@ -165,7 +163,6 @@ class Outcome:
     def mark(self) -> str:
         """What files, pictures and documents are marked with; empty where all is in order, and where
         nothing is known, as of a surface that another program wrote."""
-
         if self.result is None:
             return str(self.data.certificate.get("mark", "")) if self.data else ""
         return self.shown.certificate.mark or ("" if self.design is None or self.design.met else MISSED)
@@ -201,7 +198,6 @@ class Outcome:
         self, tolerance: float, *, mirror_images: str = "alike", walls: bool = False, anyway: bool = False
     ) -> Panels:
         """The schedule of the panels of what is shown; see ``pcmc.panels``."""
-
         surface, certificate = self.shown
         how: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls}
         sort = partial(panels, surface, tolerance, **how, anyway=anyway, certificate=certificate)
@@ -209,18 +205,15 @@ class Outcome:
 
     def fewer_families(self, tolerance: float, change: float, **options: Any) -> FewerFamilies:
         """What is shown with fewer families of panels; see ``pcmc.fewer_families``."""
-
         return fewer_families(self.shown.surface, tolerance, change, **options)
 
     def panel_net(self, size: float, pattern: str, direction: float, anyway: bool = False) -> PanelNet:
         """Quads or hexagons on what is shown; see ``pcmc.panel_net``."""
-
         surface, certificate = self.shown
         return panel_net(surface, size, pattern, direction=direction, anyway=anyway, certificate=certificate)
 
     def drawing_set(self, output: Output, *, anyway: bool = False, **options: Any) -> DrawingSet:
         """The drawings of what is shown, as ``output`` says; ``options`` as of ``pcmc.drawing_set``."""
-
         warn_of_members(self, "drawings", held=True)
         options |= {"sheet": output.sheet, "panel_sheets": output.panel_sheets}
         options |= {"members": members_drawn(self), "mark": self.mark}
@@ -228,7 +221,6 @@ class Outcome:
 
     def report(self, output: Output, *, files: Mapping[str, str], anyway: bool = False) -> RoofReport:
         """The report on what is shown, with the mesh check if it was made."""
-
         about, project = self._about(output, anyway), self.project
         about |= {"mesh_check": self.mesh_check, "mesh_failure": self.mesh_failure, "margins": self.margins}
         about |= {"files": files, "date": output.date, "figures": self.figures}
@@ -263,7 +255,6 @@ class Outcome:
 
     def cutting_pattern(self, wanted: CuttingOptions, anyway: bool = False) -> CuttingPattern:
         """The cutting pattern of what is shown, of the cloth in [structure]; made once for [pattern]."""
-
         surface, certificate = self.shown
         project, cloth = self.project, wanted
         structure = None if project is None else project.structure
@@ -341,7 +332,6 @@ class Outcome:
 
     def margin(self, what: str, progress: OnStep | None = None) -> Margin:
         """How far what is shown is from the edge, found once; see ``pcmc.margin``, also for the errors."""
-
         surface, certificate = self.shown
         callback = _reporter(f"margin of {what}", progress)
         find = partial(margin, surface, what, callback=callback, certificate=certificate)

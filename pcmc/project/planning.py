@@ -50,7 +50,6 @@ def project_text(
     ``units``: by default the drawing's. ``gap``: gaps up to it are closed. ``refer``: by name, instead of
     its lines; ``folder`` is the project's, by default the drawing's. FileError, PlanError, MissingExtra.
     """
-
     path = Path(path)
     project = Path(folder or path.parent) / path.with_suffix(".toml").name
     name = drawing_reference(path, project) if refer else ""
@@ -124,7 +123,6 @@ def proposal_text(project: Project) -> str:
 
 def _curve(curve: Any, closed: bool = False) -> str:
     """A curve, or a point, in TOML, a line for each part; where all are ``closed``, none says it."""
-
     data = curve_data(curve) if isinstance(curve, Curve) else [float(f"{x:.12g}") for x in curve]
     if closed and isinstance(data, Mapping) and data.get("closed"):
         data = data["polyline"]

@@ -140,7 +140,6 @@ def _solve(project: Project, surface: Surface, report: OnStep) -> Outcome:
 
 
 def _meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
-
     _newton_alone(project, "meet targets")
     solves, tolerance = count(1), project.target_tolerance
     options = {**project.options} | ({} if tolerance is None else {"tolerance": tolerance})
@@ -159,7 +158,6 @@ def _certified(result: Result, report: OnStep, stopped: bool, **found: Any) -> O
 
 
 def _solve_to_accuracy(project: Project, surface: Surface, report: OnStep) -> Outcome:
-
     def callback(row: Mapping[str, Any]) -> None:
         report(f"accuracy: {row['triangles']} triangles, error {row['excess']:.2g} of the accuracy wanted")
 

@@ -153,7 +153,6 @@ def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Targ
 
     The least tension of these caps is p times area over length of the boundary's projection.
     """
-
     if not mesh.rises:
         return surface, [], []
     edges, supported = surface.topology.edges, surface.supported

@@ -143,10 +143,13 @@ class _Source(NamedTuple):
 
     def loaded(self, surface: Surface, values: Mapping[str, float]) -> Surface:
         """The surface with other tensions and pressures; numbers of the file and shifts are ignored."""
-        known: dict[str, tuple[str, str]] = {}
+        known = {
+            f"{CABLE}{cable.name}.{KINDS[kind][1]}": (kind, cable.name)
+            for kind in ("cables", "cable_weights")
+            for cable in surface.cables
+        }
         for kind, named in reversed(all_values(surface).items()):  # a patch comes after a cable of its name
-            for prefix in ("", CABLE) if kind in ("cables", "cable_weights") else ("",):
-                known |= {f"{prefix}{name}.{KINDS[kind][1]}": (kind, name) for name in named}
+            known |= {f"{name}.{KINDS[kind][1]}": (kind, name) for name in named}
         given: dict[str, dict[str, float]] = {kind: {} for kind in KINDS}
         for name in filter(self.is_load, values):
             if name not in known:  # shows no coordinates but one that is near; patches have shorter names

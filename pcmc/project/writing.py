@@ -157,7 +157,6 @@ def schedule_jobs(path: Path, schedule: Panels) -> FileJobs:
 
 def cost_jobs(path: Path, costs: pd.DataFrame) -> FileJobs:
     """The table and the picture of ``FewerFamilies.costs``, with the functions that write them."""
-
     curves = {"surfaces on the way": costs, "the cheapest": costs[costs["cheapest"]]}
     pairs = {name: (one["change"], one["cost"]) for name, one in curves.items()}
     picture = partial(lines, pairs, x="change of shape, length", y="cost", markers=True)
@@ -171,7 +170,6 @@ def model_job(outcome: Outcome, path: Path, model: StructuralModel) -> FileJob:
 
 def analysis_jobs(outcome: Outcome, path: Path, analysis: Analysis) -> FileJobs:
     """The tables and pictures of an analysis beside the structural model."""
-
     pictures: dict[str, Any] = {"cases": under_load}
     pictures |= {"member-forces": member_forces} if analysis.model.beams else {}
     jobs = {f"{name}.csv": partial(table.to_csv, index=False) for name, table in analysis.tables.items()}
@@ -194,7 +192,6 @@ def draw_picture(
     mark: str = "",
 ) -> None:
     """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
-
     check_picture(views, colour)
     if colour == "reactions":
         reactions(surface, path, view=views[0], units=units, mark=mark)

@@ -129,7 +129,6 @@ def _members(model: StructuralModel, table: pd.DataFrame, units: Units, *picture
 
 def cutting_chapter(pattern: CuttingPattern, units: Units) -> Iterator[Block]:
     """What is cut in sentences, the strips on the roof from above and coloured by strain, and their table."""
-
     table, sewn = pattern.table, pattern.seam_table.query("kind != 'rim'")
     sheet = seam_sheet(pattern, FORMAT, units.length)
     yield Heading(f"Cutting pattern, scale {sheet.scale}, lengths in {units.length}", new_page=True)

@@ -182,9 +182,12 @@ def columns_in(table: pd.DataFrame, units: Mapping[str, str]) -> Columns:
 
 def small(value: float) -> str:
     """The size of an error."""
-    return (f"{value:.0e}" if value else "0") if math.isfinite(value) else "–"
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.0e}" if value else "0"
 
 
 def _bar(value: float) -> str:
     """An error bar, to two digits; nothing for one without bound, and "given" where the value is given."""
-    return (f"± {column([value], 2)[0]}" if math.isfinite(value) else "–") if value else "given"
+    text = f"± {column([value], 2)[0]}" if math.isfinite(value) else "–"
+    return text if value else "given"

@@ -117,11 +117,16 @@ class Solves:
                 interrupted.append(error)
                 raise
 
-        steps = min(homotopy.steps, self.options.get("iterations", homotopy.steps))
-        how: dict[str, Any] = {"min_quality": MIN_QUALITY, "steps": steps, "smallest": homotopy.smallest}
-        watch = until_turned(count, homotopy.back)
         try:
-            branch = follow(surface, parameter, 1.0 / homotopy.unit, callback=watch, **how)
+            branch = follow(
+                surface,
+                parameter,
+                1.0 / homotopy.unit,
+                callback=until_turned(count, homotopy.back),
+                min_quality=MIN_QUALITY,
+                steps=min(homotopy.steps, self.options.get("iterations", homotopy.steps)),
+                smallest=homotopy.smallest,
+            )
         except NoBranch:
             return None
         if interrupted:  # by the callback, whatever it raised

@@ -61,11 +61,19 @@ def newton(
         except CurvedContactError as error:
             why = str(error).removeprefix("order: ").removesuffix("; give order=1")
             end.note = f"its triangles are flat, though order={order} was asked for: {why}"
-    reached, work = end.state.result_surface(), (len(end.rows) - 1, log.evaluations, end.rows)
-    changes = tuple((room_pressures(reached) - room_pressures(first)).tolist())
-    value = energy(reached) if reached.rooms else end.state.energy
-    clear = [end.clear] if end.clear else []
-    return Result(reached, end.status, "newton", value, *work, end.note, room_changes=changes, clear=clear)
+    reached = end.state.result_surface()
+    return Result(
+        surface=reached,
+        status=end.status,
+        method="newton",
+        energy=energy(reached) if reached.rooms else end.state.energy,
+        iterations=len(end.rows) - 1,
+        evaluations=log.evaluations,
+        rows=end.rows,
+        note=end.note,
+        room_changes=tuple((room_pressures(reached) - room_pressures(first)).tolist()),
+        clear=[end.clear] if end.clear else [],
+    )
 
 
 def _with_volumes(surface: Surface) -> Surface:

@@ -59,9 +59,10 @@ def _search(start: Surface, first: Result, solves: Solves) -> Result:
     for way in ways:
         end = attempt(way, solves) if isinstance(way, Homotopy) else (way, "from a lower start")
         if not isinstance(end, Attempt):
-            result = solves.solve(end[0])
+            surface, how = end
+            result = solves.solve(surface)
             if result.converged:
-                note = f"found {end[1]}, as the given start led to none ({given})"
+                note = f"found {how}, as the given start led to none ({given})"
                 return replace(result, note="; ".join(filter(None, (note, result.note))))
             end = Attempt(way.way if isinstance(way, Homotopy) else "low start", _name(result))
         tried.append(end)

@@ -52,6 +52,7 @@ class Smoother:
         for axis in self._axes:
             across = [on for plane, on in planes if np.linalg.norm(np.cross(axis, plane.normal)) <= PARALLEL]
             masks.append(used & ~np.logical_or.reduce([surface.pinned, *across]))
+        # the distinct ones of these masks, and (3,) which of them each axis has
         self._free, self._number = np.unique(masks, axis=0, return_inverse=True)
         self._spaces = [_one_unknown_each(free) for free in self._free]
         self._patterns = [hessian_pattern(self._classes, space) for space in self._spaces]

@@ -35,7 +35,7 @@ GRACE = 2.0  # seconds that a process may exceed its time limit before it is kil
 THREADS = [f"{library}_NUM_THREADS" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA", "NUMEXPR")]
 ONE_THREAD = dict.fromkeys([*THREADS, "VECLIB_MAXIMUM_THREADS", "PCMC_THREADS"], "1")
 SCRIPT = Path(case_script.__file__)
-SIGNALS = {-number: f"signal {number.name}" for number in signal.Signals}  # by exit code
+SIGNALS = {-number: f"signal {number.name}" for number in signal.Signals if number}  # by exit code
 
 
 def failed_outcome(status: str, message: str, seconds: float, about: dict[str, Any]) -> dict[str, Any]:

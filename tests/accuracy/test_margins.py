@@ -14,7 +14,7 @@ from generators.catenary import FOLD
 from pcmc import Cable, Patch, Surface, certify, margin, solve
 from pcmc.accuracy import MarginEnd
 from pcmc.accuracy.margins import End
-from pcmc.accuracy.varied import named
+from pcmc.accuracy.varied import Varied, named
 from pcmc.base.errors import OptionError, SurfaceError
 from studies.reference import evolver
 
@@ -188,6 +188,15 @@ def test_one_name_of_a_patch_and_of_a_cable_means_the_patch():
     )  # fmt: skip
     assert named(tent)["sail"] == (("tension", "sail"),)
     assert named(tent)["tension"] == (("tension", "sail"), ("cable", "sail"))
+
+
+def test_a_cable_with_the_name_of_a_wall_is_none():
+    """Less of it is the way to the edge, as for any cable; more of a wall's tension."""
+    halves = two_squares(3)
+    inner = halves.topology.edges[~halves.topology.boundary_edge][:1]
+    named_alike = halves.rebuilt(cables=[Cable("wall", 2.0, inner)])
+    assert not Varied.of(named_alike, "cable").more
+    assert Varied.of(named_alike, "tension of wall").more
 
 
 def test_what_is_not_at_rest_has_none():

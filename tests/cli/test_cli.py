@@ -242,6 +242,7 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["panels", "roof.toml", "--tolerance", "1", "--cost", "1,2"], "give --change, too"),
         (["panels", "roof.toml", "--tolerance", "1", "--change", "1", "--cost", "nan,2"], "--cost: expected"),
         (["panels", "roof.toml", "--pattern", "quads", "--size", "1", "--sheet", "B3"], "unknown sheet"),
+        (["pattern", "roof.toml", "--width", "1", "-o", "cloth.pdf", "--sheet", "B3"], "unknown sheet"),
         (
             ["panels", "roof.toml", "--pattern", "planar-quads", "--size", "1", "--direction", "3"],
             "direction: is of a grid in plan",

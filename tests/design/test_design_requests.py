@@ -10,7 +10,7 @@ from refusals import refused
 from shapes import pyramid
 
 import pcmc
-from generators import double_bubble, hypar_roof, joined_caps, two_squares
+from generators import double_bubble, hypar_roof, joined_caps, two_caps, two_squares
 from pcmc import Parameter, Target, meet, sensitivities
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.tolerances import AT_REST
@@ -125,6 +125,14 @@ def test_the_two_sheets_of_a_cushion_are_no_two_pressures_of_a_search():
     assert meet(cushion, aim, [Parameter(sheets, "pressure")]).surface.pressures == pytest.approx(
         found, rel=1e-4
     )
+
+
+def test_snow_leans_a_wall_as_much_as_pressure_the_other_way():
+    """Its rows are linear in the top edge, however far a slope times one goes below Π."""
+    caps = pcmc.solve(two_caps(1.2), tolerance=1e-12).surface
+    lean, of = Target("lean", "wall"), [Parameter("large", kind) for kind in ("pressure", "snow")]
+    pressure, snow = (sensitivities(caps, lean, one).to_numpy().ravel() for one in of)
+    assert pressure == pytest.approx(-snow[::-1], rel=1e-9)
 
 
 @pytest.mark.parametrize("x", ["a", None, True])

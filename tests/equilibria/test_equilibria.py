@@ -291,6 +291,12 @@ def test_of_two_sheets_the_nearest_vertex_may_be_on_the_wrong_one():
     assert shape_distance(one, other) == 0.0
 
 
+def test_a_surface_shrunk_to_a_point_has_no_distance():
+    cap = spherical_cap(0.5)
+    with refused(SurfaceError, what="other"):
+        shape_distance(cap, cap.moved(0.0 * cap.vertices))
+
+
 def test_the_distance_is_symmetric_and_as_long_as_the_unit():
     one, other = spherical_cap(0.25), spherical_cap(0.2, height=0.5)
     there = shape_distance(one, other)

@@ -100,7 +100,7 @@ def test_solved_alone_the_whole_comes_out_the_same(case):
 def test_a_junction_does_not_end_where_two_mirror_planes_meet():
     quarter = pcmc.solve(quarter_of_fans()).surface
     ends = [end for mode in pcmc.certify(quarter, modes=3).modes for end in slipping_ends(quarter, mode)]
-    assert {tuple(quarter.vertices[end].round(9).tolist()) for _, end, _ in ends} == {(20.0, 0.0, 0.0)}
+    assert {tuple(quarter.vertices[end.vertex].round(9).tolist()) for end in ends} == {(20.0, 0.0, 0.0)}
 
 
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")

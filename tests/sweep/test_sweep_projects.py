@@ -308,6 +308,15 @@ def test_a_tension_that_the_rise_of_a_mesh_finds_is_not_swept(roof):
     assert len(project_sweep("roof.toml", others)) == 4
 
 
+def test_a_cable_is_meant_by_its_own_name_before_one_whose_name_has_cable_before_it(roof):
+    text = '[plan]\nedge = "cable"\ncable = 9.0\ntension = 1.0\npressure = 0.0\n'
+    text += "outline = [[0, 0], [9, 0], [9, 9], [0, 9]]\nsupports = [[0, 0], [9, 0], [9, 9], [0, 9]]\n"
+    text += 'cables = [{name = "1", tension = 4.0, curve = [[0, 0], [9, 0]]}]\n'
+    roof.write_text(text, encoding="utf-8")
+    tensions = {cable.name: cable.tension for cable in varied(roof, {"cable 1.tension": 5.0})[1].cables}
+    assert (tensions["cable 1"], tensions["1"]) == (5.0, 4.0)
+
+
 def test_the_tension_of_a_cable_is_a_force_also_where_nothing_is_at_rest(roof):
     text = 'units = "m"\nforce = "kN"\n[plan]\nedge = "cable"\ncable = 9.0\ntension = 1.0\npressure = 0.0\n'
     text += "outline = [[0, 0], [9, 0], [9, 9], [0, 9]]\nsupports = [[0, 0], [9, 0], [9, 9], [0, 9]]\n"

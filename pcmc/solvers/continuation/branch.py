@@ -216,9 +216,17 @@ def _traced(parameter: Direction | BoundaryMotion, tracer: Tracer) -> Branch:
     ending, detail = tracer.run()
     columns = list(tracer.event("", tracer.here.state, 0.0, 0, 0))
     events = pd.DataFrame(tracer.events, columns=columns)
-    points, kept = pd.DataFrame(tracer.rows), events.drop(columns="surface")
-    end, at_events = (tracer.surfaces, ending, detail), dict(enumerate(events.surface))
-    return Branch(parameter, points, kept, *end, at_events, tracer.line, tracer.options)
+    return Branch(
+        parameter,
+        pd.DataFrame(tracer.rows),
+        events.drop(columns="surface"),
+        tracer.surfaces,
+        ending,
+        detail,
+        dict(enumerate(events.surface)),
+        tracer.line,
+        tracer.options,
+    )
 
 
 def follow(

@@ -73,7 +73,8 @@ class Segment:
         if first * self.derivative(name, self.end) >= 0.0:
             return None
         sense, accuracy = math.copysign(1.0, first), max(EVENT_ACCURACY, FOLD_ACCURACY * self.length)
-        return float(fminbound(lambda t: -sense * self.value(name, t), 0.0, self.length, xtol=accuracy))
+        end = self.length
+        return float(fminbound(lambda t: -sense * self.value(name, t), 0.0, end, xtol=accuracy, disp=0))
 
     @cached_property
     def fold(self) -> float | None:
