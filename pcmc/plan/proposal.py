@@ -168,12 +168,17 @@ def least_tension(area: Any, pressure: float = 1.0) -> float:
     return pressure * low
 
 
-def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> tuple[dict[str, Any], Chosen]:
-    """The keys of a plan for a drawing: those ``given``, and values for all others; and what was chosen.
+def proposed(drawing: Drawing, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """The keys of a plan for a drawing: those ``given``, and values for all others.
 
     An entry of ``dividers``, ``holes`` or ``cables`` with the ``name`` of a drawn one and no curve changes
     that one; others are added. PlanError or OptionError for a name that the drawing does not have.
     """
+    return proposal(drawing, given)[0]
+
+
+def proposal(drawing: Drawing, given: Mapping[str, Any] | None = None) -> tuple[dict[str, Any], Chosen]:
+    """The same keys, and which of their values were chosen."""
     values, chosen = dict(given or {}), Chosen()
     sail = drawing.loose or bool(drawing.cables) or values.get("edge") in ("free", "cable")
     holes = list(drawing.holes.values())

@@ -14,7 +14,7 @@ from ..base.files import PathLike, as_path, check_name, check_regular
 from ..base.units import LENGTHS
 from ..plan.drawing import Drawing, read_drawing
 from ..plan.plan import Chosen
-from ..plan.proposal import proposed
+from ..plan.proposal import proposal
 from ..plan.strokes import layer_of, read_strokes
 from .checking import in_file
 
@@ -73,7 +73,7 @@ def with_drawing(path: Path, data: Mapping[str, Any]) -> tuple[Mapping[str, Any]
     drawing = drawing_of(path.parent / name, str(data.get("units", "")), gap)
 
     try:
-        lines, chosen = proposed(drawing, plan)
+        lines, chosen = proposal(drawing, plan)
     except OptionError as error:
         raise error.in_file(path, FileError) from None
     full = {**data, "plan": lines} | ({"units": drawing.units} if drawing.units else {})

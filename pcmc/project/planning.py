@@ -54,7 +54,7 @@ def project_text(
     project = Path(folder or path.parent) / path.with_suffix(".toml").name
     name = drawing_reference(path, project) if refer else ""
     drawing = drawing_of(path, units, gap)
-    values, _ = proposed(drawing)
+    values = proposed(drawing)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # no project is written that cannot be meshed
         surface_of(Project(path, plan_from(values), drawing=drawing))

@@ -88,7 +88,7 @@ def test_millimetres_and_metres_give_the_same_plan(tmp_path):
     assert (metres.unit, same.unit, same.units, own.units) == ("m", "mm", "m", "mm")
     assert same.notes[0] == "lengths converted from mm to m (1 mm = 0.001 m)"
     assert own.outline.length == pytest.approx(1000.0 * metres.outline.length, rel=1e-12)
-    values = [proposed(plan)[0] for plan in (metres, same)]
+    values = [proposed(plan) for plan in (metres, same)]
     assert values[0]["patches"].keys() == values[1]["patches"].keys()
     assert values[0]["edge_length"] == values[1]["edge_length"]
 
@@ -163,7 +163,7 @@ def test_walls_stand_on_the_ground_beside_a_raised_hole(tmp_path):
     space.add_polyline3d(corners, close=True, dxfattribs=drawn.on("outline"))
     space.add_line((4, 0), (4, 6), dxfattribs=drawn.on("divider"))
     document.saveas(tmp_path / "tilted.dxf")
-    (divider,) = proposed(read_drawing(tmp_path / "tilted.dxf"))[0]["dividers"]
+    (divider,) = proposed(read_drawing(tmp_path / "tilted.dxf"))["dividers"]
     assert divider["bottom"] == "sloped"
 
 
@@ -267,10 +267,10 @@ def test_curves_of_rhino_stay_exact(tmp_path):
     assert np.linalg.norm(half.points[1]) == pytest.approx(4.0, rel=1e-12)
     assert abs(half.sweep) == pytest.approx(math.pi, rel=1e-12)
     assert curve_data(plan.holes["eye"]) == {"circle": {"centre": [4.0, 9.0, 2.0], "radius": 1.2}}
-    assert [(d["name"], d["bottom"]) for d in proposed(plan)[0]["dividers"]] == [("chancel", "held")]
+    assert [(d["name"], d["bottom"]) for d in proposed(plan)["dividers"]] == [("chancel", "held")]
     with refused(FileError, what=str(path)):
         raise_for_overwriting(path)
-    pcmc.write(tmp_path / "roof.3dm", plan_from(proposed(plan)[0]).surface())
+    pcmc.write(tmp_path / "roof.3dm", plan_from(proposed(plan)).surface())
     assert not project.is_drawing(tmp_path / "roof.3dm")
 
 
@@ -321,5 +321,5 @@ def test_masts_and_supports_that_just_miss_the_outline_are_moved_to_it(tmp_path,
     text = "4 points of supports moved by up to"
     assert any(text in note for note in near.notes)
     assert (
-        plan_from(proposed(near)[0]).surface().vertices == plan_from(proposed(exact)[0]).surface().vertices
+        plan_from(proposed(near)).surface().vertices == plan_from(proposed(exact)).surface().vertices
     ).all()

@@ -13,7 +13,7 @@ from refusals import refused
 from pcmc import project
 from pcmc.base.errors import FileError, OptionError, PlanError, SurfaceError
 from pcmc.plan.drawing import read_drawing
-from pcmc.plan.proposal import proposed
+from pcmc.plan.proposal import proposal, proposed
 from pcmc.plan.reading_drawings import dxf_entities
 from pcmc.plan.strokes import read_strokes
 
@@ -81,7 +81,7 @@ def test_a_tension_counts_in_whichever_text_of_a_patch_it_stands(tmp_path):
     stated, bare = ("text", "patch", "nave = 7.5"), ("text", "patch", "nave")
     beside = [("point", "patch nave", (2, 3)), ("line", "divider north", (4, 0), (4, 6))]
     for calls in ([stated, bare], [stated, *beside]):
-        plan, chosen = proposed(read_drawing(drawing(tmp_path, *calls)))
+        plan, chosen = proposal(read_drawing(drawing(tmp_path, *calls)))
         assert {name: patch["tension"] for name, patch in plan["patches"].items()} == {"nave": 7.5}
         assert not chosen.tensions
     with refused(PlanError, what="patch", where="nave"):
@@ -91,7 +91,7 @@ def test_a_tension_counts_in_whichever_text_of_a_patch_it_stands(tmp_path):
 def test_names_that_do_not_fit_the_drawing_are_refused(tmp_path):
     file = drawing(tmp_path, ("text", "patch", "nave = 7.5"))
     plan = read_drawing(file)
-    assert proposed(plan)[0]["patches"]["nave"]["tension"] == 7.5
+    assert proposed(plan)["patches"]["nave"]["tension"] == 7.5
     with refused(OptionError, what="patches", where="nve"):
         proposed(plan, {"patches": {"nve": {"tension": 1.0}}})
     with refused(OptionError, what="dividers", found="a"):

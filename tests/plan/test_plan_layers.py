@@ -154,7 +154,7 @@ def test_the_ends_of_a_dirty_y_meet_in_one_point(tmp_path):
     ]
     wide = read_drawing(dirty(tmp_path / "y.dxf"), gap=1e-4)
     with refused(PlanError, what="divider 'b'", found=pytest.approx(0.004, rel=0.02)):
-        project.planning.plan_from(proposed(wide)[0]).surface()
+        project.planning.plan_from(proposed(wide)).surface()
 
 
 def test_a_project_that_follows_its_drawing_changes_a_drawn_cable(tmp_path):
@@ -208,7 +208,7 @@ def test_a_whole_outline_may_be_a_cable(tmp_path):
 def test_a_weight_and_a_pressure_of_all_patches_beside_a_drawing(tmp_path):
     drawn.nave(tmp_path / "hall.dxf")
     given = {"weight": 0.02, "pressure": 0.9, "patches": {"apse": {"weight": 0.05}}}
-    plan = project.planning.plan_from(proposed(read_drawing(tmp_path / "hall.dxf"), given)[0])
+    plan = project.planning.plan_from(proposed(read_drawing(tmp_path / "hall.dxf"), given))
     patches = {
         p.name: (p.pressure, p.weight) for p in plan.surface().patches if p.name in ("west", "east", "apse")
     }
