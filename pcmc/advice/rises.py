@@ -82,7 +82,7 @@ def taken(
         return []
     if len(given) > 1:
         where = "the plan" if patch is None else f"patch {patch!r}"
-        text = f"{where} has a {' and a '.join(given)}; give one of them, the others follow"
+        text = f"{where} has {' and '.join(given)}; give one of them, the others follow"
         raise OptionError(text, what=given[0], where=patch)
     if not keep:
         values["tension"] = 1.0

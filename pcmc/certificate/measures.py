@@ -61,7 +61,11 @@ class Measure(NamedTuple):
 
 
 def largest(values: Floats, size: float, branches: Callable[[Ints], Branches]) -> Measurement:
-    """The largest of ``values``, of the usual ``size``; ``branches`` gives derivatives of some of them."""
+    """The largest of ``values``, of the usual ``size``; ``branches`` gives derivatives of some of them.
+
+    OptionError where there are none."""
+    if not len(values):
+        raise OptionError("it has no triangles to measure: the wall is pinched all along", what="of")
     order = np.argsort(-values, kind="stable")
     near = order[values[order] >= values[order[0]] - TIE * size]
     found = branches(near)

@@ -71,7 +71,7 @@ class CutMesh:
         """The pieces that it falls into, each with vertices of its own."""
         topo = self.topology
         sides = topo.neighbours[~self.cut_edge[topo.edge_of_face.ravel()[topo.neighbours[:, 0]]]]
-        # the corners there of both triangles, of which the second runs the other way
+        # corners of both triangles at the ends of their side, which the second has in the other order
         ends = 3 * (sides // 3)[:, None] + (sides[:, None] + np.array([[1], [2]])) % 3
         ends[..., 1] = ends[:, ::-1, 1]
         label = components(ends.reshape(-1, 2), 3 * len(self.F))

@@ -30,7 +30,7 @@ FIRST_ATTEMPTS = 4  # of following, before the project's own walls are tried
 START_SECONDS = 6.0  # time limit of solving from the start shape
 Values = Mapping[str, Mapping[str, Any]]  # numbers by kind and name; and points, each [x, y, z]
 Stop = Callable[[], bool]
-Progressed = Callable[[str], None]  # is told each step
+Progressed = Callable[[str], None]  # called with a line for each step
 
 
 def until(stop: Stop, seconds: float) -> Stop:

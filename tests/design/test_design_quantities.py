@@ -11,7 +11,7 @@ from shapes import pyramid
 import pcmc
 from generators import double_bubble, spherical_cap, two_caps, two_squares
 from pcmc import Parameter, Patch, Target, sensitivities
-from pcmc.base.errors import SurfaceError
+from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.tolerances import AT_REST
 from pcmc.design.targets import MEASURES, measure
 
@@ -206,3 +206,9 @@ def test_a_junction_pulled_off_by_more_than_its_wall_holds_is_not_at_rest():
     assert np.isfinite(sensitivities(pinched, Target("volume"), "left").to_numpy()).all()
     with refused(SurfaceError, what="surface", expected=AT_REST):
         sensitivities(pinched.retensioned({"wall": 1.0}), Target("volume"), "left")
+
+
+def test_a_wall_that_is_pinched_all_along_has_no_apex():
+    roof = pcmc.solve(two_caps(2.4, alpha_large=6.0, alpha_small=5.0, alpha_aux=16.0)).surface
+    with pytest.raises(OptionError, match="the wall is pinched all along"):
+        sensitivities(roof, Target("apex", "wall"), Parameter("large"))
