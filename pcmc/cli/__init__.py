@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     default = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # nohup ignores it
     own_process = arguments is None and default
     if arguments is None:
-        _keep_freed_memory()
+        keep_freed_memory()
     if own_process:
         signal.signal(signal.SIGINT, _exit)  # a library that is half imported may lose an exception
         gc.disable()  # until all is imported; what lives to the end is not worth searching
@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             gc.freeze()  # and it ends without a last search
 
 
-def _keep_freed_memory() -> None:
+def keep_freed_memory() -> None:
     """Let large arrays reuse the memory of those before, which Linux would take back and clear each time."""
     if sys.platform == "linux":
         import ctypes

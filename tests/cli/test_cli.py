@@ -391,7 +391,7 @@ def test_where_large_arrays_cannot_reuse_memory_no_option_is_set(monkeypatch):
     asked = []
     monkeypatch.setattr("ctypes.CDLL", lambda _: SimpleNamespace(mallopt=lambda *given: asked.append(given)))
     monkeypatch.setattr("sys.platform", "linux")
-    cli._keep_freed_memory()
+    cli.keep_freed_memory()
     assert asked == [(cli.M_MMAP_THRESHOLD, 2**31 - 1)]
 
 
