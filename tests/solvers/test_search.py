@@ -321,7 +321,7 @@ def test_from_equal_tensions_to_those_asked_for():
     assert tensions["large"] > 1.0
     assert tensions["small"] > 1.5
     assert f"folds at large {tensions['large']:.4g}, small" in result.message
-    found = solve(two_caps(1.6, alpha_large=6.0, alpha_small=5.0, alpha_aux=16.0), target="stationary")
+    found = solve(two_caps(1.2, alpha_large=6.0, alpha_small=5.0, alpha_aux=16.0), target="stationary")
     assert found.certificate.verdict is Verdict.STABLE
     assert "along the branch from equal tensions" in found.message
 
