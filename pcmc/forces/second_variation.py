@@ -1,10 +1,9 @@
 """The second variation of E: blocks of elements assembled, projected into the motion space and applied.
 
-For nodes i and j of an element, ∂²E/∂x_i∂x_j is the 3×3 matrix of ``triangles`` or ``curved``, or given by each
-of the other forces (``elements``); a vertex that slides along a circle adds ⟨κ, ∇E⟩ along its tangent
-(``circle_curvatures``). The *stiffness* L has only multiples of 1.
-``assemble`` projects hessian · ∂²E + stiffness · L into the motion space; ``hessian_product`` multiplies ∂²E
-by a motion.
+For nodes i and j of an element, ∂²E/∂x_i∂x_j is the 3×3 matrix of ``triangles`` or ``curved``, or given by
+each of the other forces (``elements``); a vertex that slides along a circle adds ⟨κ, ∇E⟩ along its tangent
+(``circle_curvatures``). The *stiffness* L has only multiples of 1. ``assemble`` projects
+hessian · ∂²E + stiffness · L into the motion space; ``hessian_product`` multiplies ∂²E by a motion.
 """
 
 from __future__ import annotations

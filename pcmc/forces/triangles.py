@@ -11,8 +11,8 @@ height z̄ of its corners over Π, whose normal is n. Seen from the reference po
     ∂²E/∂i∂j  =  s ν νᵀ + k 1 + [q]× + u nᵀ + n vᵀ,   T = α + w z̄
 
 with s = T (e_i·e_j) / (4A); q = ∓½ T ν ± p x_k / 6 (upper signs where j follows i, k the third corner; 0 for
-i = j); u = w g_i / 3 and v = w g_j / 3. The *stiffness* has only k = T₊ (e_i·e_j) / (4A), T₊ = α + max(w z̄, 0).
-``second_variation`` has the loops of both.
+i = j); u = w g_i / 3 and v = w g_j / 3. The *stiffness* has only k = T₊ (e_i·e_j) / (4A), with
+T₊ = α + max(w z̄, 0). ``second_variation`` has the loops of both.
 
 A sheet of weight w acts like one of tension α + w z, pushed by w n per area: at rest
 H = (p - w ⟨ν, n⟩) / (2 (α + w z)). Where α + w z ≤ 0 it is under compression. A triangle without area has no
