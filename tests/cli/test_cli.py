@@ -194,9 +194,9 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["solve", "none.obj"], "none.obj: cannot be read"),
         (["solve", "none.toml"], "none.toml: cannot be read"),
         (["solve", "roof.toml", "-o", "x.obk"], "did you mean '.obj'"),
-        (["solve", "roof"], "Known: .toml, .pcmc"),
+        (["solve", "roof"], "known: .toml, .pcmc"),
         (["solve", "."], ".: is no regular file but a folder"),
-        (["certify", "roof.txt"], "Known: .toml, .pcmc"),
+        (["certify", "roof.txt"], "known: .toml, .pcmc"),
         (["solve", "roof.toml", "-o", "roof.png"], "a picture has its own option"),
         (["solve", "roof.toml", "--picture", "roof.obj"], "roof.obj: the suffix of a picture is .png"),
         (["convert", "roof.toml", "roof.png"], "roof.png: unknown suffix"),
@@ -371,13 +371,21 @@ def test_without_typer_the_extra_is_named(monkeypatch, capsys):
     assert err.count("\n") == 1
 
 
-def test_without_shapely_the_extra_is_named():
-    """Every command reads projects, and projects need it."""
-    code = "import sys; sys.modules['shapely'] = None; import pcmc.cli; sys.exit(pcmc.cli.main(['--help']))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2
-    assert "pcmc-surfaces[plan]" in done.stderr
-    assert done.stderr.count("\n") == 1
+def test_without_shapely_plans_alone_are_refused(folder):
+    """A surface needs no plan. Before, every command was refused, its help, too."""
+    code = "import sys; sys.modules['shapely'] = None; from pcmc import cli; sys.exit(cli.main(sys.argv[1:]))"
+
+    def run(*arguments):
+        command = [sys.executable, "-c", code, *arguments]
+        return subprocess.run(command, capture_output=True, text=True, timeout=120)
+
+    pcmc.write("mesh.pcmc", two_squares(2, alpha_aux=1.0))
+    assert run("convert", "mesh.pcmc", "mesh.obj").returncode == 0
+    refused = run("solve", "roof.toml")
+    assert refused.returncode == 2
+    assert "shapely is not installed" in refused.stderr
+    assert "pcmc-surfaces[plan]" in refused.stderr
+    assert refused.stderr.count("\n") == 1
 
 
 def test_a_mistake_of_our_own_is_not_hidden(folder, monkeypatch):
