@@ -252,7 +252,7 @@ def lift(
 ) -> Surface:
     """The whole surface with resting ``vertices`` raised along ``ways`` (n,3) by a fraction of their spacing.
 
-    By default off Π. The rows below come up straight: bent as before, they could cost more than the pull gains.
+    By default off Π. The rows below come up straight: bent as before, they could cost more than it gains.
     """
     ways = walls.side[:, None] * np.array(surface.plane.normal) if ways is None else ways
     spacing, rows = top_spacing(surface, walls), walls.rows
