@@ -257,7 +257,7 @@ def lift(
     ways = walls.side[:, None] * np.array(surface.plane.normal) if ways is None else ways
     spacing, rows = top_spacing(surface, walls), walls.rows
     rise = fraction * np.where(vertices & np.isfinite(spacing), spacing, 0.0)
-    X, under = surface.vertices + rise[:, None] * ways, vertices[rows.top_ends].any(axis=1)
+    X, under = surface.vertices + rise[:, None] * ways, np.any(vertices[rows.top_ends], axis=1)
     straight, below = replace(rows, offset=np.where(under[:, None], 0.0, rows.offset)), rows.vertices[under]
     X[below] = place_wall_rows(surface, replace(walls, rows=straight), X)[below]
     return surface.moved(X)
