@@ -47,92 +47,21 @@ if TYPE_CHECKING:
     from .solvers import solve
     from .solvers.continuation import BoundaryMotion, Direction, follow
     from .solvers.neighbours import NeighbourSwap, swap_neighbours
-    from .structure import (
-        Gas,
-        Material,
-        Member,
-        Profile,
-        SelfWeight,
-        Snow,
-        StructuralModel,
-        Wind,
-        analyse,
-        read_results,
-        write_structure,
-    )
+    from .structure import Material, Member, Profile, StructuralModel, analyse, read_results, write_structure
+    from .structure.gas import Gas
+    from .structure.loads import SelfWeight, Snow, Wind
     from .surface import Cable, Circle, Line, Patch, Plane, Room, Surface, cut, images_in, mirrored
 
-__all__ = [
-    "BoundaryMotion",
-    "Cable",
-    "Certificate",
-    "Circle",
-    "CuttingPattern",
-    "Design",
-    "Direction",
-    "Equilibria",
-    "FewerFamilies",
-    "Gas",
-    "Line",
-    "Margin",
-    "Material",
-    "Member",
-    "MeshCheck",
-    "MeshVerdict",
-    "NeighbourSwap",
-    "PanelNet",
-    "Panels",
-    "Parameter",
-    "Patch",
-    "Plane",
-    "Profile",
-    "Repaired",
-    "Room",
-    "SelfWeight",
-    "Snow",
-    "StructuralModel",
-    "Surface",
-    "Target",
-    "Theorem",
-    "Verdict",
-    "Wind",
-    "analyse",
-    "cell_stress",
-    "certify",
-    "check_mesh",
-    "curvature_error",
-    "cut",
-    "cutting_pattern",
-    "energy",
-    "errors",
-    "explore",
-    "fewer_families",
-    "find_equilibria",
-    "follow",
-    "free_cell",
-    "gradient",
-    "hessian",
-    "images_in",
-    "margin",
-    "mean_curvature",
-    "meet",
-    "mirrored",
-    "panel_net",
-    "panels",
-    "read",
-    "repair",
-    "read_results",
-    "room_volume_gradients",
-    "room_volumes",
-    "sensitivities",
-    "solve",
-    "solve_to_accuracy",
-    "swap_neighbours",
-    "target_curvature",
-    "verify",
-    "write",
-    "write_structure",
-]
+__all__ = ["BoundaryMotion", "Cable", "Certificate", "Circle", "CuttingPattern", "Design", "Direction"]
+__all__ += ["Equilibria", "FewerFamilies", "Gas", "Line", "Margin", "Material", "Member", "MeshCheck"]
+__all__ += ["MeshVerdict", "NeighbourSwap", "PanelNet", "Panels", "Parameter", "Patch", "Plane", "Profile"]
+__all__ += ["Repaired", "Room", "SelfWeight", "Snow", "StructuralModel", "Surface", "Target", "Theorem"]
+__all__ += ["Verdict", "Wind", "analyse", "cell_stress", "certify", "check_mesh", "curvature_error", "cut"]
+__all__ += ["cutting_pattern", "energy", "errors", "explore", "fewer_families", "find_equilibria", "follow"]
+__all__ += ["free_cell", "gradient", "hessian", "images_in", "margin", "mean_curvature", "meet", "mirrored"]
+__all__ += ["panel_net", "panels", "read", "repair", "read_results", "room_volume_gradients", "room_volumes"]
+__all__ += ["sensitivities", "solve", "solve_to_accuracy", "swap_neighbours", "target_curvature", "verify"]
+__all__ += ["write", "write_structure"]
 
 # Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
 # handle Ctrl-C before numpy and scipy are imported.
@@ -148,19 +77,10 @@ _NAMES = {
     "equilibria": ("Equilibria", "cell_stress", "find_equilibria", "free_cell"),
     "io": ("read", "write"),
     "io.repairing": ("Repaired", "repair"),
-    "structure": (
-        "Gas",
-        "Material",
-        "Member",
-        "Profile",
-        "SelfWeight",
-        "Snow",
-        "StructuralModel",
-        "Wind",
-        "analyse",
-        "read_results",
-        "write_structure",
-    ),
+    "structure": ("Material", "Member", "Profile", "StructuralModel", "analyse", "read_results"),
+    "structure.inp": ("write_structure",),
+    "structure.gas": ("Gas",),
+    "structure.loads": ("SelfWeight", "Snow", "Wind"),
     "solvers": ("solve",),
     "solvers.continuation": ("BoundaryMotion", "Direction", "follow"),
     "solvers.neighbours": ("NeighbourSwap", "swap_neighbours"),

@@ -385,8 +385,8 @@ def measured_margin(surface: Surface, of: str | None) -> Measurement:
     if found is None or not len(found.mode):
         return Measurement(math.nan if found is None else found.factor, still)
     if found.ends_by is not MarginEnd.FOLD:
-        text = f"margin of {what}: it ends by a {found.ends_by.name.lower()}, whose slopes are not known;"
-        raise OptionError(f"{text} as a target it has to end by a fold", what="of", found=what)
+        text = f"margin of {what}: as a target it has to end by a fold, and it ends otherwise"
+        raise OptionError(f"{text} ({found.ends_by.value})", what="of", found=what)
     end, phi, slopes = found.surface, found.mode, dict[str, Floats]()
     along = float((phi * varied.direction.line(end).gradient(end, end.vertices)).sum())
     walls = {(k, p.name) for k, _ in varied.parts if varied.what == k for p in end.patches if p.wall}

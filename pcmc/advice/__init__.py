@@ -2,7 +2,3 @@
 
 Gives these to projects. May import ``design`` and the subpackages below them.
 """
-
-from ..base.libraries import require
-
-require("shapely", extra="plan")

@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import shapely
 from scipy.spatial import cKDTree
 
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
+from ..base.libraries import shapely
 from ..base.tolerances import ON
 from ..design import Parameter, Target
 from ..plan import Hole, Plan, patch_names

@@ -106,14 +106,17 @@ class FreeSurfaceWarning(UserWarning):
     """No support holds the surface: translations cost no energy."""
 
 
-def unknown(what: str, found: object, known: Iterable[str]) -> str:
-    """Message for an unknown name, with the nearest known one.
+def unknown(what: str, found: object, known: Iterable[str], note: str = "") -> str:
+    """Message for an unknown name, with the nearest known one, and a ``note``, a sentence of its own.
 
     >>> unknown("method", "newtn", ["newton", "lbfgs"])
     "unknown method 'newtn'; did you mean 'newton'? Known: newton, lbfgs"
+    >>> unknown("method", "flow", ["newton", "lbfgs"])
+    "unknown method 'flow'; known: newton, lbfgs"
     """
     names = list(known)
     near = [name for name in names if name.casefold() == str(found).casefold()]
     near = near or get_close_matches(str(found), names, n=1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
-    return f"unknown {what} {found!r}; {hint}Known: {', '.join(names) or '(none)'}"
+    notes = [f"did you mean {name!r}?" for name in near[:1]] + [note] * bool(note)
+    listed = f"{'Known' if notes else 'known'}: {', '.join(names) or '(none)'}"
+    return f"unknown {what} {found!r}; {' '.join([*notes, listed])}"

@@ -138,6 +138,20 @@ def load_library(name: str, extra: str = "files") -> Any:
         raise MissingExtra(name, extra) from None
 
 
+class _Library:
+    """A library that is loaded when something of it is first used; MissingExtra then if it is missing."""
+
+    def __init__(self, name: str, extra: str) -> None:
+        self._name, self._extra = name, extra
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(load_library(self._name, self._extra), name)
+
+
+shapely: Any = _Library("shapely", "plan")
+"""For geometry in the plane."""
+
+
 def require(*names: str, extra: str = "files") -> None:
     """MissingExtra, with the last of these libraries, unless all are installed."""
     if any(find_spec(name) is None for name in names):

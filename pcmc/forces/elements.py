@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints, read_only
+from ..base.arrays import Floats, Ints, kept_with_owner, read_only
 from ..surface import Surface
 from ..surface.lagrange import Shapes, shapes
 
@@ -45,14 +45,15 @@ class Mesh(NamedTuple):
         return self._replace(faces=faces, rows=rows, patch=self.patch[first:last])
 
 
-def energy_mesh(surface: Surface, *laws: Floats) -> Mesh:
-    """All elements of a surface, with its own tensions, net pressures and weights (k,), or three others."""
-    alpha, p, w = map(read_only, laws or (surface.tensions, surface.net_pressures, surface.weights))
+@kept_with_owner
+def energy_mesh(surface: Surface) -> Mesh:
+    """All elements of a surface, with its own tensions, net pressures and weights."""
     ground, normal = np.array(surface.plane.point), np.array(surface.plane.normal)
     nodes, of_elements = surface.nodes, shapes(surface.order)
     rows = surface.topology.faces if surface.periodic else nodes
     patch = read_only(np.ascontiguousarray(surface.patch_of_face[:: surface.order**2]))
-    return Mesh(nodes, rows, patch, surface.origin, alpha, p, w, ground, normal, of_elements)
+    laws = surface.tensions, surface.net_pressures, surface.weights
+    return Mesh(nodes, rows, patch, surface.origin, *laws, ground, normal, of_elements)
 
 
 class Points(NamedTuple):

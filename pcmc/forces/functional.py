@@ -24,7 +24,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, read_only
 from ..surface import Surface, expect_surface
 from ..surface.supports import apply_supports
 from . import cables, flat_pieces
@@ -60,17 +60,13 @@ def energy_at(surface: Surface, X: Floats) -> float:
     6.0
     """
     mesh = energy_mesh(surface)
-    return total(mesh, totals_and_gradient(mesh, X, sums_alone=True)[0]) + add_forces(surface, X)
+    sums = totals_and_gradient(mesh, X, sums_alone=True)[0]
+    return total(mesh, sums) + add_values(elements(surface, X))
 
 
 def elements(surface: Surface, X: Floats) -> Iterator[Elements]:
     """The elements of all ``FORCES`` at X (n,3)."""
     return (each for force in FORCES for each in force(surface, X))
-
-
-def add_forces(surface: Surface, X: Floats, gradient: Floats | None = None) -> float:
-    """The energy at X (n,3) of all ``FORCES``; its gradient is added to ``gradient`` (n,3)."""
-    return add_values(elements(surface, X), gradient)
 
 
 def total(mesh: Mesh, sums: Floats) -> float:
@@ -100,7 +96,7 @@ def energy_and_gradient(
     X = surface.vertices if X is None else X
     mesh = energy_mesh(surface)
     sums, gradient = totals_and_gradient(mesh, X, workers)
-    further = add_forces(surface, X, gradient)
+    further = add_values(elements(surface, X), gradient)
     surface.folded(gradient)
     if supports:
         apply_supports(surface, gradient, X)
@@ -136,10 +132,11 @@ def weighted(
 
     ∫ z dA is 0 where all w are. Flat pieces are part of V.
     """
-    laws = [np.full(len(surface.patches), each, dtype=float) for each in (tensions, pressures, weights)]
+    laws = (np.full(len(surface.patches), each, dtype=float) for each in (tensions, pressures, weights))
+    alpha, p, w = map(read_only, laws)
     X = surface.vertices if X is None else X
-    sums, forces = totals_and_gradient(energy_mesh(surface, *laws), X)
-    add_values(flat_pieces.elements(surface, X, laws[1]), forces)
+    sums, forces = totals_and_gradient(energy_mesh(surface)._replace(tension=alpha, pressure=p, weight=w), X)
+    add_values(flat_pieces.elements(surface, X, p), forces)
     add_plane_volumes(surface, X, sums[1])
     return sums, surface.folded(forces)
 

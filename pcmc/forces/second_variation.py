@@ -1,13 +1,9 @@
 """The second variation of E: blocks of elements assembled, projected into the motion space and applied.
 
-For corners i and j of an element, ∂²E/∂x_i∂x_j is the 3×3 matrix
-
-    s t tᵀ + k 1 + [q]× + u nᵀ + n vᵀ
-
-for triangles (``triangles``), and given by each of the other forces (``elements``); a vertex that slides
-along a circle adds ⟨κ, ∇E⟩ along its tangent (``circle_curvatures``). The *stiffness* L has only k.
-``assemble`` projects hessian · ∂²E + stiffness · L into the motion space; ``hessian_product`` multiplies ∂²E
-by a motion.
+For nodes i and j of an element, ∂²E/∂x_i∂x_j is the 3×3 matrix of ``triangles`` or ``curved``, or given by
+each of the other forces (``elements``); a vertex that slides along a circle adds ⟨κ, ∇E⟩ along its tangent
+(``circle_curvatures``). The *stiffness* L has only multiples of 1. ``assemble`` projects
+hessian · ∂²E + stiffness · L into the motion space; ``hessian_product`` multiplies ∂²E by a motion.
 """
 
 from __future__ import annotations
@@ -26,7 +22,6 @@ from .elements import Elements, Mesh, add_hessian_products, energy_mesh
 from .functional import elements, energy_and_gradient
 from .motion_space import MotionSpace, VertexClasses
 from .pattern import Pattern, hessian_pattern, pair_place, row_place
-from .triangles import Block, Tilt, triangle, triangle_block, triangle_skew, triangle_tilt
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -103,66 +98,50 @@ def hessian_product(surface: Surface, mesh: Mesh, X: Floats, d: Floats) -> Float
     return change
 
 
-@inlined
-def _times(b: Block, q: Vector | None, tilt: Tilt | None, y: Vector) -> Vector:
-    """The block times y; None for q and tilt leaves them out."""
-    out = add(scaled(b.s * dot(b.t, y), b.t), scaled(b.k, y))
-    if q is not None:
-        out = add(out, cross(q, y))
-    if tilt is not None:
-        out = add(out, add(scaled(dot(tilt.n, y), tilt.u), scaled(dot(tilt.v, y), tilt.n)))
-    return out
-
-
-@inlined
-def _add_diagonal(
-    space: MotionSpace, pattern: Pattern, v: int, b: Block, tilt: Tilt | None, data: Floats
-) -> None:
-    """Add Bᵀ block B of a vertex with itself."""
-    for r in range(space.dimension[v]):
-        at = row_place(space, pattern, v, r)
-        column = _times(b, None, tilt, vector(space.basis[v, r]))
-        for s in range(r, space.dimension[v]):
-            data[at + s] += dot(vector(space.basis[v, s]), column)
-
-
-@inlined
-def _add_pair(
-    space: MotionSpace,
-    pattern: Pattern,
-    v: int,
-    w: int,
-    offset: int,
-    b: Block,
-    q: Vector | None,
-    tilt: Tilt | None,
-    data: Floats,
-) -> None:
-    """Add Bᵀ block B of vertex v with w, two ends of an edge with this offset in the pattern."""
-    for s in range(space.dimension[w]):
-        column = _times(b, q, tilt, vector(space.basis[w, s]))
-        for r in range(space.dimension[v]):
-            at = pair_place(space, pattern, v, r, w, s, offset)
-            data[at] += dot(vector(space.basis[v, r]), column)
-
-
 @compiled
 def _assemble_triangles(
     mesh: Mesh, X: Floats, space: MotionSpace, pattern: Pattern, hessian: float, stiffness: float, out: Floats
 ) -> None:
-    rows, n = mesh.rows, vector(mesh.normal)
-    for f in range(len(rows)):
-        t = triangle(mesh, X, f, hessian, stiffness)
+    """The letters are those of ``triangles``, with the factors ``hessian`` and ``stiffness`` in them."""
+    F, rows, origin, n = mesh.faces, mesh.rows, vector(mesh.origin), vector(mesh.normal)
+    for f in range(len(F)):
+        x = (sub(point(X, F[f, 0]), origin), sub(point(X, F[f, 1]), origin), sub(point(X, F[f, 2]), origin))
+        edge = (sub(x[2], x[1]), sub(x[0], x[2]), sub(x[1], x[0]))
+        normal, patch, raised = cross(edge[1], edge[2]), mesh.patch[f], 0.0
+        twice_area, alpha, w = norm(normal), mesh.tension[patch], mesh.weight[patch]
+        scale = 1.0 / twice_area if twice_area > 0.0 else 0.0
+        if w != 0.0:
+            middle = add(scaled(1.0 / 3.0, add(add(x[0], x[1]), x[2])), origin)
+            raised = w * dot(sub(middle, vector(mesh.ground)), n)
+        nu, half_T, sixth = scaled(scale, normal), 0.5 * hessian * (alpha + raised), hessian / 6.0
+        k, sixth_nu = 0.5 * stiffness * (alpha + max(raised, 0.0)) * scale, scaled(sixth * w, nu)
         for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            v, w, offset = rows[f, i], rows[f, j], pattern.offset[f, i]
-            alone, pair, q = triangle_block(t, i, i), triangle_block(t, i, j), triangle_skew(t, k)
-            if t.sixth_w == 0.0:
-                _add_diagonal(space, pattern, v, alone, None, out)
-                _add_pair(space, pattern, v, w, offset, pair, q, None, out)
-            else:
-                _add_diagonal(space, pattern, v, alone, triangle_tilt(t, n, i, i), out)
-                _add_pair(space, pattern, v, w, offset, pair, q, triangle_tilt(t, n, i, j), out)
+            j, third = (i + 1) % 3, (i + 2) % 3
+            v, w_, offset = rows[f, i], rows[f, j], pattern.offset[f, i]
+            along, across = dot(edge[i], edge[i]), dot(edge[i], edge[j])
+            q = sub(scaled(sixth * mesh.pressure[patch], x[third]), scaled(half_T, nu))
+            u, tilt = cross(sixth_nu, edge[i]), cross(sixth_nu, edge[j])
+            for r in range(space.dimension[v]):
+                at, b = row_place(space, pattern, v, r), vector(space.basis[v, r])
+                column = _stretched(half_T * scale * along, k * along, nu, b)
+                if w != 0.0:
+                    column = add(column, add(scaled(dot(n, b), u), scaled(dot(u, b), n)))
+                for s in range(r, space.dimension[v]):
+                    out[at + s] += dot(vector(space.basis[v, s]), column)
+            for s in range(space.dimension[w_]):
+                b = vector(space.basis[w_, s])
+                column = add(_stretched(half_T * scale * across, k * across, nu, b), cross(q, b))
+                if w != 0.0:
+                    column = add(column, add(scaled(dot(n, b), u), scaled(dot(tilt, b), n)))
+                for r in range(space.dimension[v]):
+                    at = pair_place(space, pattern, v, r, w_, s, offset)
+                    out[at] += dot(vector(space.basis[v, r]), column)
+
+
+@inlined
+def _stretched(s: float, k: float, nu: Vector, b: Vector) -> Vector:
+    """(s ν νᵀ + k 1) b."""
+    return add(scaled(s * dot(nu, b), nu), scaled(k, b))
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""The force of a triangle under tension α, pressure p and weight w: value, gradient and Hessian block.
+"""The force of a triangle under tension α, pressure p and weight w: value and gradient; its Hessian block.
 
 A triangle has corners a, b, c (counter-clockwise seen from its positive side), the edges opposite them
 e_a = c - b, e_b = a - c, e_c = b - a, the area A, the unit normal ν = (b - a) × (c - a) / 2A and the mean
@@ -8,11 +8,11 @@ height z̄ of its corners over Π, whose normal is n. Seen from the reference po
     V           ∂V/∂a = (b × c) / 6              (15b, with the sign that makes (10b) positive)
     ∫z dA = A z̄     ∂/∂a = z̄ g_a + A n/3
 
-    ∂²E/∂i∂j  =  s t tᵀ + k 1 + [q]× + u nᵀ + n vᵀ,   T = α + w z̄
+    ∂²E/∂i∂j  =  s ν νᵀ + k 1 + [q]× + u nᵀ + n vᵀ,   T = α + w z̄
 
-with s = T (e_i·e_j) / (4A) and t = ν; q = ∓½ T ν ± p x_k / 6 (upper signs where j follows i, k the third
-corner; 0 for i = j); u = w g_i / 3 and v = w g_j / 3. The *stiffness* has only
-k = T₊ (e_i·e_j) / (4A), T₊ = α + max(w z̄, 0).
+with s = T (e_i·e_j) / (4A); q = ∓½ T ν ± p x_k / 6 (upper signs where j follows i, k the third corner; 0 for
+i = j); u = w g_i / 3 and v = w g_j / 3. The *stiffness* has only k = T₊ (e_i·e_j) / (4A), with
+T₊ = α + max(w z̄, 0). ``second_variation`` has the loops of both.
 
 A sheet of weight w acts like one of tension α + w z, pushed by w n per area: at rest
 H = (p - w ⟨ν, n⟩) / (2 (α + w z)). Where α + w z ≤ 0 it is under compression. A triangle without area has no
@@ -22,14 +22,12 @@ threads. Where a patch has a weight, the sums and the gradient are those of ``cu
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.compiled import blocks, compiled, inlined, run_blocks, threads
+from ..base.compiled import blocks, compiled, run_blocks, threads
 from ..surface import Surface
-from ..surface.geometry import Vector, accumulate, add, cross, dot, norm, point, scaled, sub, vector
+from ..surface.geometry import accumulate, cross, dot, norm, point, scaled, sub, vector
 from .curved import measure_elements
 from .elements import Mesh
 
@@ -81,16 +79,17 @@ def totals_and_gradient(
     order: the same number of workers gives the same bytes, and a mesh under two BLOCKs the same bytes on
     every machine.
     """
-    parts, heavy = len(blocks(len(mesh.faces), workers or threads())), mesh.weight.any()
+    parts = len(blocks(len(mesh.faces), workers or threads()))
+    plain = not (mesh.curved or mesh.weight.any())
     sums = np.zeros((parts, 3, len(mesh.tension)))
     gradient = [np.zeros((0, 3) if sums_alone else X.shape) for _ in range(parts)]
 
     def work(part: int, first: int, last: int) -> None:
         area, volume, moment = sums[part]
-        if mesh.curved or heavy:
-            measure_elements(mesh, X, first, last, area, volume, moment, gradient[part])
-        else:
+        if plain:
             measure_block(mesh, X, first, last, area, volume, gradient[part])
+        else:
+            measure_elements(mesh, X, first, last, area, volume, moment, gradient[part])
 
     run_blocks(work, len(mesh.faces), workers)
     for other in gradient[1:]:
@@ -110,70 +109,3 @@ def heavy_triangle_pulls(surface: Surface) -> Floats:
     """(m,) α + w z̄ of the triangles with a weight, force/length; infinite for others. ≤ 0 is compression."""
     pull = effective_tensions(surface, surface.vertices, surface.faces, surface.patch_of_face)
     return np.where(surface.weights[surface.patch_of_face] != 0.0, pull, np.inf)
-
-
-class Block(NamedTuple):
-    """s t tᵀ + k 1."""
-
-    s: float
-    t: Vector
-    k: float
-
-
-class Tilt(NamedTuple):
-    """u nᵀ + n vᵀ."""
-
-    u: Vector
-    v: Vector
-    n: Vector
-
-
-class Triangle(NamedTuple):
-    """What the blocks of a triangle are made of, with the factors ``hessian`` and ``stiffness`` in it."""
-
-    corner: tuple[Vector, Vector, Vector]  # seen from the reference point
-    edge: tuple[Vector, Vector, Vector]  # opposite the corners
-    nu: Vector  # unit normal; zero if there is no area
-    s: float  # T / (4A)
-    k: float  # T₊ / (4A)
-    half_pull: Vector  # ½ T ν
-    sixth_p: float  # p / 6
-    sixth_w: float  # w / 6
-
-
-@inlined
-def triangle(mesh: Mesh, X: Floats, f: int, hessian: float, stiffness: float) -> Triangle:
-    """Triangle f of hessian · ∂²E + stiffness · L."""
-    F, origin, patch = mesh.faces, vector(mesh.origin), mesh.patch[f]
-    a, b, c = sub(point(X, F[f, 0]), origin), sub(point(X, F[f, 1]), origin), sub(point(X, F[f, 2]), origin)
-    edge = (sub(c, b), sub(a, c), sub(b, a))
-    normal = cross(edge[1], edge[2])
-    twice_area = norm(normal)
-    scale = 1.0 / twice_area if twice_area > 0.0 else 0.0
-    alpha, weight, nu, extra = mesh.tension[patch], mesh.weight[patch], scaled(scale, normal), 0.0
-    if weight != 0.0:
-        middle = add(scaled(1.0 / 3.0, add(add(a, b), c)), origin)
-        extra = weight * dot(sub(middle, vector(mesh.ground)), vector(mesh.normal))
-    half, sixth = 0.5 * hessian * (alpha + extra), hessian / 6.0
-    k = 0.5 * stiffness * (alpha + max(extra, 0.0)) * scale
-    press = sixth * mesh.pressure[patch]
-    return Triangle((a, b, c), edge, nu, half * scale, k, scaled(half, nu), press, sixth * weight)
-
-
-@inlined
-def triangle_block(t: Triangle, i: int, j: int) -> Block:
-    """s t tᵀ + k 1 of two corners."""
-    cosine = dot(t.edge[i], t.edge[j])
-    return Block(t.s * cosine, t.nu, t.k * cosine)
-
-
-@inlined
-def triangle_skew(t: Triangle, k: int) -> Vector:
-    """q for a corner and the one that follows; k is the third."""
-    return sub(scaled(t.sixth_p, t.corner[k]), t.half_pull)
-
-
-@inlined
-def triangle_tilt(t: Triangle, n: Vector, i: int, j: int) -> Tilt:
-    """u nᵀ + n vᵀ of two corners."""
-    return Tilt(scaled(t.sixth_w, cross(t.nu, t.edge[i])), scaled(t.sixth_w, cross(t.nu, t.edge[j])), n)

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from itertools import compress, pairwise
 
 import numpy as np
-import shapely
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import PlanError
+from ..base.libraries import shapely
 from ..surface.pieces import point_text
 from ..surface.topology import components
 from .lines import SNAP, Cut, Kind, LineTree, PlanLine, check_holes, check_line, overlap

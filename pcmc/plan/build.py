@@ -9,13 +9,13 @@ from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
-import shapely
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints, toml
 from ..base.errors import PlanError, PlanWarning, SurfaceError
+from ..base.libraries import shapely
 from ..base.tolerances import ON
 from ..forces.rooms import check_rooms
 from ..meshing.planar import PlanarMesh, locate, signed_areas

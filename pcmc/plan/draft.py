@@ -12,10 +12,10 @@ from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import shapely
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError, SurfaceError
+from ..base.libraries import shapely
 from ..meshing.planar import SIDES, PlanarMesh, signed_areas, triangulate
 from ..meshing.walls import UpperEdge, WallMesh, build_walls
 from ..surface import Patch, Plane, Room

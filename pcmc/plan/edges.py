@@ -8,10 +8,10 @@ from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import shapely
 
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import PlanError
+from ..base.libraries import shapely
 from ..base.tolerances import ON
 from ..meshing.walls import EDGES
 from ..surface import Cable, Patch, Plane

@@ -9,10 +9,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import shapely
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import PlanError
+from ..base.libraries import shapely
 from ..surface.curves import Curve
 from ..surface.geometry import cross_2d
 from ..surface.pieces import point_text
@@ -69,7 +69,7 @@ class PlanLine:
         return shapely.linestrings(np.stack([self.xy[:-1], self.xy[1:]], axis=1))
 
     @cached_property
-    def tree(self) -> shapely.STRtree:
+    def tree(self) -> Any:
         """Of the chords."""
         return shapely.STRtree(self.chords)
 

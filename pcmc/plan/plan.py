@@ -12,13 +12,14 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import toml
 from ..base.errors import OptionError
-from ..base.libraries import require
 from ..base.validate import checked_name
 from ..meshing.walls import EDGES
 from ..surface import Plane, Surface
 from ..surface.curves import Curve
 from ..surface.parts import listed
 from . import parts
+from .build import build_surface
+from .draft import part_count
 from .parts import check_keys
 
 CURVES = {"kind": "a list of curves or tables"}  # of keys
@@ -190,9 +191,6 @@ class Plan:
 
     def surface(self) -> Surface:
         """The mesh of the plan at its initial height, with its walls and supports."""
-        require("shapely", extra="plan")
-        from .build import build_surface  # a plan without its mesh does not need it
-
         return build_surface(self)
 
 
@@ -244,9 +242,6 @@ def patch_names(plan: Plan) -> tuple[str, ...]:
     """
     if plan.patches:
         return tuple(patch.name for patch in plan.patches)
-    require("shapely", extra="plan")
-    from .draft import part_count
-
     return tuple(f"patch {k + 1}" for k in range(part_count(plan)))
 
 

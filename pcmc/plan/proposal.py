@@ -9,10 +9,9 @@ from itertools import compress, filterfalse, product
 from typing import Any
 
 import numpy as np
-import shapely
-from shapely.affinity import affine_transform
 
 from ..base.errors import OptionError, PlanError, unknown
+from ..base.libraries import shapely
 from ..base.tolerances import ON
 from ..surface.curves import Curve
 from ..surface.pieces import two_digits
@@ -117,7 +116,7 @@ def _unfolded(area: Any, mirrors: Sequence[Curve]) -> Any:
         a, b = mirror.at([0.0, 1.0])[:, :2]
         along = (b - a) / np.linalg.norm(b - a)
         turn = 2.0 * np.outer(along, along) - np.eye(2)
-        image = affine_transform(area, [*turn.ravel(), *(a - turn @ a)])
+        image = shapely.transform(area, lambda xy, a=a, turn=turn: a + (xy - a) @ turn)
         area = shapely.union_all([area, image], grid_size=ON * math.sqrt(area.area))
     return area
 
@@ -245,7 +244,7 @@ def proposal(drawing: Drawing, given: Mapping[str, Any] | None = None) -> tuple[
 
 
 def _wall_tension(
-    curve: Curve, parts: shapely.STRtree, tensions: Sequence[float], near: float, most: float, upright: bool
+    curve: Curve, parts: Any, tensions: Sequence[float], near: float, most: float, upright: bool
 ) -> float:
     """The tension of a wall between the parts near a curve; an upright one needs no difference of theirs."""
     points = shapely.points(curve.at(len(curve.pieces) * (np.arange(SAMPLES) + 0.5) / SAMPLES)[:, :2])

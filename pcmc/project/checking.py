@@ -84,8 +84,8 @@ def _check_table(text: str, section: Section, place: Place, table: Any) -> None:
         if name not in known:
             curves = CURVES if section.name in OR_CURVE and not known.keys() & table.keys() else ()
             homes = [one.title for one in keys.sections()[:-1] if any(key.name == name for key in one.keys)]
-            home = f"{name!r} is a key of {' or '.join(homes[:2])}. Known:" if homes else "Known:"
-            message = unknown(f"key of {title}", name, [*known, *curves]).replace("Known:", home)
+            home = f"{name!r} is a key of {' or '.join(homes[:2])}." if homes else ""
+            message = unknown(f"key of {title}", name, [*known, *curves], home)
             raise _error(text, (*place, name), message, found=name, expected=tuple(known))
     for name, key in known.items():
         if key.default is REQUIRED and name not in table and not any(other in table for other in key.unless):

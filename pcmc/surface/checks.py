@@ -60,7 +60,7 @@ def face_array(faces: Any, n: int) -> Ints:
         refuse_shape("faces", F, "(m, 3) with m > 0")
     _within("faces", F, n, "vertex")
     refuse_rows("faces", F, (F[:, [1, 2, 0]] == F).any(axis=1), "has a vertex twice", "remove the face")
-    return F.astype(np.int32)
+    return F.astype(np.int32, order="C")
 
 
 def patch_array(patch_of_face: Any, m: int, names: Sequence[str]) -> Ints:

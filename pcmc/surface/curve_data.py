@@ -64,7 +64,7 @@ def curve(spec: Any, closed: bool = False) -> Curve:
         if key in spec and kind != owner:
             problem = f"only a {owner} has the key {key}"
             if key == "closed":
-                problem += f"; a {kind} is closed if it ends at its start"
+                problem += "; other curves are closed if they end at their start"
             raise OptionError(problem, what=key)
     if kind == "bezier":
         return bezier(value, spec.get("weights"))

@@ -34,7 +34,7 @@ def test_a_roof_there_has_the_mesh_the_margin_and_the_cloth_of_the_same_roof_her
     for x, y in ((0.0, 0.0), (500000.0, 5812345.0)):
         corners, line = [[x, y], [x + 12, y], [x + 12, y + 8], [x, y + 8]], [[x + 4, y], [x + 4, y + 8]]
         hole = Hole({"circle": {"centre": [x + 8, y + 4], "radius": 1.0}})
-        plan = Plan(corners, [line], edge_length=1.0, tension=2.6, holes=[hole])
+        plan = Plan(corners, [line], edge_length=1.5, tension=2.6, holes=[hole])
         roofs.append(pcmc.solve(plan.surface()).surface)
     pressure = [pcmc.margin(roof, "pressure", meshes=1).factor for roof in roofs]
     assert pressure[1] == pytest.approx(pressure[0], rel=0.01)

@@ -138,7 +138,8 @@ edge_length = 0.57
 WISHES = {"rise = 2.5": "12", "span_ratio = 3": "345", "tension = 3.91": "4567"}  # first digits advised
 
 
-@pytest.mark.parametrize("wish", night_but(WISHES, "rise = 2.5"))
+@pytest.mark.nightly
+@pytest.mark.parametrize("wish", WISHES)
 def test_a_roof_too_steep_at_a_hole_is_advised_to_be_flatter(tmp_path, wish):
     """It was "held by the mesh" without a word on what to type."""
     first = outcome_of(tmp_path, STEEP + wish)

@@ -67,7 +67,7 @@ def test_beyond_the_large_cap_the_way_down_has_no_end(caps):
 
 
 def test_deflation_alone_finds_the_large_cap():
-    found = find_equilibria(spherical_cap(0.25), (), starts=6)
+    found = find_equilibria(spherical_cap(0.35), (), starts=6)
     assert [one.index for one in found.found] == [0, 1]
     assert found[2].found == "by deflation"
     assert not found.branches

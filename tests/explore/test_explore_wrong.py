@@ -82,7 +82,7 @@ def test_wrong_values_are_answered_in_one_line(explorer, session, path, body, li
 def test_what_to_type_at_the_end_of_a_long_line_is_kept(explorer, session):
     body = json.dumps({"tensions": {"a" * 300: 1.0}})
     _, content = asked(explorer, "POST", f"/api/{session}/follow", body)
-    assert json.loads(content)["error"].endswith("Known: cap")
+    assert json.loads(content)["error"].endswith("known: cap")
 
 
 @pytest.mark.parametrize("token", ["", "x", "\xe9"])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from convergence import orders
+from nightly import at_night
 from periodic_cases import bay, scattered, tube
 from refusals import refused
 
@@ -120,7 +121,7 @@ def test_rooms_on_a_mesh_too_coarse_are_refused():
         room_volumes(foam.rebuilt(rooms=[Room("half open", {film: 1}, 0.5)]))
 
 
-@pytest.mark.parametrize("kind", ["P", "D", "G"])
+@pytest.mark.parametrize("kind", ["P", "D", *at_night("G")])
 def test_triply_periodic_minimal_surfaces(kind):
     """Area of order 2; index 1 in the cell, and 0 where the volumes of both sides are kept (Ross 1992)."""
     cells, errors = round(1.0 / np.linalg.det(LATTICES[kind])), []

@@ -6,6 +6,7 @@ import os
 
 import numpy as np
 import pytest
+from nightly import at_night
 from periodic_cases import bay
 from refusals import refused
 
@@ -286,7 +287,7 @@ def test_what_cannot_be_repaired_is_refused_by_name(tmp_path):
             pcmc.repair(path, **options)
 
 
-@pytest.mark.parametrize("units", ["mm", ""])
+@pytest.mark.parametrize("units", ["mm", *at_night("")])
 @pytest.mark.parametrize("suffix", [s for s, form in io.FORMATS.items() if form.reads])
 def test_a_repaired_mesh_has_no_more_tensions_than_before(tmp_path, suffix, units):
     """Tensions and pressures of 1 stood for none, and became 1000 and 1000000 in metres."""

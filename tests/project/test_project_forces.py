@@ -95,8 +95,7 @@ def test_a_bubble_room_by_its_volume_from_toml(folder, capsys):
     assert cli.main(larger) == 0
     assert room_volumes(io.read("larger.pcmc"))[0] == pytest.approx(50.0, rel=1e-9)
     assert (
-        cli.main(["sweep", "bubble.toml", "dome.volume=30,40", "--workers", "1", "--all", "--csv", "t.csv"])
-        == 0
+        cli.main(["sweep", "bubble.toml", "dome.volume=30", "--workers", "1", "--all", "--csv", "t.csv"]) == 0
     )
     assert "30.0" in (folder / "t.csv").read_text()
     capsys.readouterr()

@@ -96,7 +96,7 @@ PLAN = "[plan]\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\n"
             'is a key of [solve] with method = "newton". Known',
         ),
         (PLAN + "wall = 2.0", "is a key of [plan.dividers] or [mesh.patches.NAME]"),
-        (PLAN + "[structure]\nuls = 1\nwidth = 1", "unknown key of [structure] 'uls'; Known:"),
+        (PLAN + "[structure]\nuls = 1\nwidth = 1", "unknown key of [structure] 'uls'; known:"),
         (PLAN + "[[plan.dividers]]\ncurve = [[3, 0], [3, 4]]\ndiameter = 0.2", "of [structure.members.NAME]"),
         (PLAN + "[plan.patches]\nwest = {tension = 3}\nrise = 2", "of [plan] it stands above [plan.patches]"),
         (PLAN + "tension = 4,5", "numbers have a decimal point, no comma"),

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from nightly import at_night
 from printed import words_of
 from refusals import refused
 from small_project import WITH_UNITS
@@ -248,7 +249,7 @@ def test_the_command_reports_on_the_designed_roof(tmp_path, monkeypatch, capsys)
 @pytest.mark.parametrize(
     ("command", "output"),
     [
-        (["report", "--no-mesh-check"], "roof.pdf"),
+        *at_night((["report", "--no-mesh-check"], "roof.pdf")),
         (["draw"], "roof.pdf"),
         (["panels", "--tolerance", "0.1"], "roof.csv"),
     ],

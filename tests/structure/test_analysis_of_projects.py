@@ -46,6 +46,12 @@ def test_the_command_runs_the_cases_and_writes_tables(tmp_path, monkeypatch, cap
     assert "roof-cables.csv" not in names
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp", "--run", "--snow", "9.0"]) == 0
     assert "snow: it hangs up to" in capsys.readouterr().out
+
+
+@needs_ccx
+@pytest.mark.nightly
+def test_the_command_ends_with_1_for_a_case_that_is_not_carried(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     pcmc.write("cap.pcmc", pcmc.solve(spherical_cap(0.2, alpha=ALPHA)).surface)
     given = ["--young", "1e4", "--thickness", "0.001", "--snow", "2.0"]
     assert cli.main(["structure", "cap.pcmc", "-o", "cap.inp", "--run", *given]) == 1

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
+from nightly import at_night
 from PIL import Image
 from refusals import refused
 from swept_roof import NUMBERS, TEXT
@@ -24,7 +25,7 @@ GRID = ["west.tension=3,3.2", "wall 1.tension=0.5,0.8"]
 
 
 def test_the_command_makes_a_table(roof, capsys):
-    given = ["sweep", "roof.toml", *GRID, "east.tension=3.1", "--csv", "t.csv"]
+    given = ["sweep", "roof.toml", *GRID, "east.tension=3.1", "--csv", "t.csv", "--store", "s"]
     assert cli.main([*given, "--all", "--plot", "t.png"]) == 0
     shown = capsys.readouterr().out
     table = pd.read_csv("t.csv")
@@ -37,7 +38,7 @@ def test_the_command_makes_a_table(roof, capsys):
     assert shown.split()[:3] == ["west.tension", "wall", "1.tension"]
     with Image.open("t.png") as picture:
         assert picture.width == 900
-    assert sorted(p.name for p in roof.parent.iterdir()) == ["roof.toml", "t.csv", "t.png"]
+    assert sorted(p.name for p in roof.parent.iterdir()) == ["roof.toml", "s", "t.csv", "t.png"]
     assert cli.main(given) == 0
     short = pd.read_csv("t.csv", index_col="case")
     assert list(short) == ["west.tension", "wall 1.tension", "status", "verdict", *NUMBERS]
@@ -89,14 +90,16 @@ def test_a_surface_is_swept_too_by_any_method(roof, capsys):
     assert "unknown number 'plan.edge_length'" in capsys.readouterr().err
 
 
-def test_options_that_another_method_leaves_out_are_named(roof, capsys):
+@pytest.mark.parametrize(
+    "given", [["solve", "roof.toml"], *at_night(["sweep", "roof.toml", "east.tension=3", "--workers", "1"])]
+)
+def test_options_that_another_method_leaves_out_are_named(roof, capsys, given):
     roof.write_text(TEXT + "order = 2\n", encoding="utf-8")
     left = "roof.toml: method lbfgs solves without the file's options of newton: tolerance = 1e-11, order = 2"
-    for given in (["solve", "roof.toml"], ["sweep", "roof.toml", "east.tension=3", "--workers", "1"]):
-        cli.main([*given, "--method", "lbfgs"])
-        assert capsys.readouterr().err.count(left) == 1
-        cli.main([*given, "--method", "newton"])
-        assert left not in capsys.readouterr().err
+    cli.main([*given, "--method", "lbfgs"])
+    assert capsys.readouterr().err.count(left) == 1
+    cli.main([*given, "--method", "newton"])
+    assert left not in capsys.readouterr().err
 
 
 def test_an_accuracy_that_is_missed_is_1(roof):

@@ -166,7 +166,7 @@ def test_a_wall_that_follows_its_rooms_stays_a_wall():
     assert not changed.uncancelled.any()
 
 
-@pytest.mark.parametrize("upright", [True, False])
+@pytest.mark.parametrize("upright", [*at_night(True), False])
 def test_a_branch_goes_on_where_a_junction_comes_down_on_a_held_bottom(upright):
     """First contact is near 1.216 times the tension of an upright wall, near 1.411 times that of another."""
     start = solve(hall(4.0, 3.0, upright)).surface
@@ -181,7 +181,7 @@ def test_a_branch_goes_on_where_a_junction_comes_down_on_a_held_bottom(upright):
     assert branch.points.energy.iloc[-1] == pytest.approx(direct.energy, rel=2e-4)  # triangles lie otherwise
 
 
-@pytest.mark.parametrize("upright", [True, False])
+@pytest.mark.parametrize("upright", [True, *at_night(False)])
 def test_a_branch_goes_on_where_the_last_vertex_lifts_off_a_held_bottom(upright):
     """No vertex that rests shows any longer that the wall can pinch; it is low, and counts for no quality."""
     start = solve(hall(4.0, 6.0, upright)).surface
