@@ -27,6 +27,7 @@ from ..stability.equilibrium import Equilibrium, SecondVariation
 from ..stability.factorisation import SingularMatrix
 from ..stability.modes import Spectrum, count_soft, lowest
 from ..surface import Plane, Surface, expect_surface, mirrored
+from ..surface.supports import part_of_roof
 from . import tables
 from .balance import load_ratio, pressures_left_over
 from .crossings import crossing_table, crossing_texts
@@ -148,7 +149,7 @@ class Certificate:
     @property
     def part(self) -> str:
         """Which part of a roof with mirror planes this is; empty for a whole roof."""
-        return "a part of the roof, which goes on behind its mirror planes" if self.symmetric_in else ""
+        return part_of_roof(self.acting.surface.on_planes)
 
     @cached_property
     def leaning(self) -> pd.DataFrame:

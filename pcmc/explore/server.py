@@ -18,7 +18,7 @@ from ..base.errors import FileWarning, SurfaceError, unknown
 from ..drawings.sheet import MISSED
 from ..io import FORMATS
 from ..project import load
-from ..project.members import has_members, members_drawn, members_filed
+from ..project.members import filed_besides, has_members, members_drawn
 from ..project.writing import certified_files
 from ..surface import Surface
 from ..surface.images import expect_no_images
@@ -210,12 +210,12 @@ class Explorer:
         warnings.filterwarnings("ignore", category=FileWarning, module=re.escape(__name__))
         known = {(False, "certificate"): state.certificate}
         outcome = dataclasses.replace(roof.outcome, result=None, start=state.surface, data=None, _known=known)
-        members = members_filed(outcome) if FORMATS[suffix].members else {}
+        besides = filed_besides(outcome) if FORMATS[suffix].besides else {}
         targets, _ = state.aims or roof.aims
         mark = "" if roof.meets(state.surface, targets) else MISSED
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"surface{suffix}"
-            for file, write in certified_files(*outcome.shown, [path], outcome.units, "", members, mark):
+            for file, write in certified_files(*outcome.shown, [path], outcome.units, "", besides, mark):
                 write(file)
             return f"{roof.name}{suffix}", path.read_bytes()
 

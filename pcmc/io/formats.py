@@ -13,6 +13,7 @@ from ..base.arrays import Floats
 from ..base.errors import FileError, unknown
 from ..base.units import Units
 from ..surface import Surface
+from .georeference import Georeference
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Format:
     bare: bool = False  # whether it holds nothing but triangles and names
     loses: tuple[str, ...] = ("order", "images")  # the ``PARTS`` that it does not hold
     reads: bool = True  # whether pcmc reads it, too
-    members: bool = False  # whether it holds the members and cables' sections of a structural model
+    besides: tuple[str, ...] = ()  # what it holds besides the surface, as ``write`` takes it
     unit: str = ""  # of length, that the format prescribes; empty if a file may have any, or says none
 
     @property
@@ -61,7 +62,8 @@ class Content:
     bare: Collection[str]  # the patches whose tension and pressure of 1 stand for none
     members: Sequence[Any]  # as ``structure.drawn_members`` has them
     cable_areas: Mapping[str, float]  # of the cables' sections, by name
-    mark: str  # of a roof that is not in order, such as "NOT CERTIFIED: …", or ""
+    mark: str  # of a part of a roof, and of one that is not in order, such as "NOT CERTIFIED: …"; or ""
+    georeference: Georeference | None
 
 
 PLANES = "planes other than Π that vertices slide on, and mirror planes (fixed in it)"
@@ -94,6 +96,7 @@ PARTS = {
     "unit": FormatPart("its unit {unit}", 1, lambda _, units: units),
 }
 TOLD = tuple(name for name, part in PARTS.items() if part.words)
+MODEL = ("members", "cable_areas")  # of a structural model
 OURS = ("support", "patch")
 EVOLVER = Format("evolver", shared=True, loses=("lines", "cable weights", "order", "images", "unit"))
 FORMATS = {
@@ -105,8 +108,8 @@ FORMATS = {
     **dict.fromkeys((".vtp", ".vtu"), Format("vtk", "both", reserved=OURS, loses=("images",))),
     **dict.fromkeys((".glb", ".gltf"), Format("gltf", "vertices", colours=True, separate=True, unit="m")),
     ".usda": Format("usd", "vertices", colours=True, separate=True, reads=False),
-    ".3dm": Format("rhino", separate=True, members=True, own=("cables",)),
-    ".ifc": Format("ifc", certificate=True, separate=True, members=True),
+    ".3dm": Format("rhino", separate=True, besides=MODEL, own=("cables",)),
+    ".ifc": Format("ifc", certificate=True, separate=True, besides=(*MODEL, "georeference")),
 }
 """The formats by suffix."""
 METRES = (".glb", ".gltf", ".3dm", ".ifc", ".usda")

@@ -11,6 +11,7 @@ and the time stamp is always the same.
 from __future__ import annotations
 
 import hashlib
+import math
 import uuid
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -82,7 +83,7 @@ class _Model:
 
         self.surface, self.units = surface, units
         self.square_metres = length_factor(units.length, "m") ** 2  # in the roof's unit of area
-        self.name = ", ".join(filter(None, ("Roof", content.mark)))
+        self.name, self.place = ", ".join(filter(None, ("Roof", content.mark))), content.georeference
         self.replaced = {member.wall for member in content.members}
         self.cable_areas = content.cable_areas
         self.file: Any = ifcopenshell.file(schema="IFC4")
@@ -125,8 +126,9 @@ class _Model:
         kind = "IfcGeometricRepresentationSubContext"
         self.body = self.add(kind, ContextIdentifier="Body", TargetView="MODEL_VIEW", **about)
         self.axis = self.add(kind, ContextIdentifier="Axis", TargetView="GRAPH_VIEW", **about)
+        self.add_georeference(context)
         about = {"RepresentationContexts": [context], "UnitsInContext": assigned_units(self.add, self.units)}
-        whole, place = self.rooted("IfcProject", "project", Name="Roof", **about), None
+        whole, place = self.rooted("IfcProject", "project", Name=self.name, **about), None
         for kind in ("Site", "Building", "BuildingStorey"):
             place = self.placement(place)
             values = {"Name": kind.replace("BuildingS", "S"), "ObjectPlacement": place}
@@ -139,6 +141,23 @@ class _Model:
         inside = {"RelatedElements": [roof], "RelatingStructure": whole}
         self.rooted("IfcRelContainedInSpatialStructure", "roof contained", **inside)
         return roof
+
+    def add_georeference(self, context: Any) -> None:
+        """The map's coordinate system, in metres, and how to get there from that of the file."""
+        if (place := self.place) is None:
+            return
+        metre, turn = self.add("IfcSIUnit", UnitType="LENGTHUNIT", Name="METRE"), math.radians(place.rotation)
+        self.add(
+            "IfcMapConversion",
+            SourceCRS=context,
+            TargetCRS=self.add("IfcProjectedCRS", Name=place.crs, MapUnit=metre),
+            Eastings=place.eastings,
+            Northings=place.northings,
+            OrthogonalHeight=place.height,
+            XAxisAbscissa=math.cos(turn),
+            XAxisOrdinate=math.sin(turn),
+            Scale=length_factor(self.units.length, "m"),
+        )
 
     def add_part(self, k: int, color: Floats, used: Ints, faces: Ints, area: float, place: Any) -> Any:
         """The element of patch k, with its vertices and triangles as in ``patch_meshes``."""

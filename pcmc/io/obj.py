@@ -36,7 +36,8 @@ def write(path: Path, surface: Surface, content: Content) -> None:
     """Vertices with all digits, supports, then the faces group by group; a backslash would join lines."""
     support = support_of(surface)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"{MARK}{content.metadata}\n" + (f"# {content.mark}\n" if content.mark else ""))
+        mark = f"# {content.mark}\no {content.mark}\n" if content.mark else ""  # programs show the object
+        file.write(f"{MARK}{content.metadata}\n{mark}")
         file.write(format_rows("v %r %r %r\n", *surface.vertices.T))
         for name, kind in HELD.items():
             held = np.flatnonzero(support == kind) + 1

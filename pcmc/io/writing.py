@@ -18,9 +18,13 @@ from ..base.units import Units, as_units, length_factor
 from ..base.validate import checked_name, choice, one_line, refuse
 from ..forces.pinching import standing_part
 from ..surface import Surface, expect_surface
+from ..surface.supports import part_of_roof
 from .formats import FORMATS, Content, format_of
+from .georeference import Georeference
 from .mesh_data import scaled_surface
 from .metadata import encode_walls, metadata_text
+
+BESIDES = {"members": "members", "cable_areas": "sections of cables", "georeference": "its place on a map"}
 
 
 def write(
@@ -34,6 +38,7 @@ def write(
     members: Sequence[Any] = (),
     cable_areas: Mapping[str, float] | None = None,
     mark: str = "",
+    georeference: Georeference | None = None,
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
@@ -54,6 +59,7 @@ def write(
     members : of its structural model, ``structure.drawn_members(model)``, for .ifc and .3dm.
     cable_areas : of the sections of its cables there, length², by name.
     mark : in the file where the certificate has none, such as "TARGETS NOT MET"; .stl has no place for one.
+    georeference : its place on a map, for .ifc.
 
     Warns
     -----
@@ -94,8 +100,8 @@ def write(
     if certificate is not None and not form.certificate:
         lost.append("certificate")
     lost += form.lost(surface, units)
-    model = {"members": members, "sections of cables": cable_areas}
-    lost += [what for what, given in model.items() if given and not form.members]
+    besides = {"members": members, "cable_areas": cable_areas, "georeference": georeference}
+    lost += [BESIDES[key] for key, given in besides.items() if given and key not in form.besides]
     surface = surface.cell if "images" in form.loses else surface
     if units and form.unit:
         surface = scaled_surface(surface, length_factor(units.length, form.unit))
@@ -119,6 +125,7 @@ def write(
         findings = {name: getattr(certificate, name) for name in findings.FILED}
     if findings:
         findings = {**findings, "mark": mark}
+    mark = ", ".join(filter(None, (part_of_roof(surface.on_planes), mark)))
     about = metadata, carried, colour, findings, walls, units, bare, members, cable_areas or {}, mark
     for name in carried:
         if re.sub(r"\s+", "_", name) in form.reserved:
@@ -126,7 +133,7 @@ def write(
             raise FileError(text, what=str(path), where=name, found=name)
     with writing(path), atomic_write(path) as temporary:
         try:
-            note = form.functions.write(temporary, shown, Content(*about))
+            note = form.functions.write(temporary, shown, Content(*about, georeference))
         except PcmcError as error:
             raise error.in_file(path, FileError, str(path)) from None
     if lost:

@@ -115,7 +115,7 @@ class PanelNet:
         """Write the panels as polygons of a Wavefront .obj, a group per patch; with the mark of the
         certificate, or else ``mark``, as a comment."""
         mark = self.certificate.mark or validate.one_line("mark", mark)
-        lines = ["# panels of pcmc", *[f"# {mark}"] * bool(mark)]
+        lines = ["# panels of pcmc", *(f"# {text}" for text in (self.certificate.part, mark) if text)]
         lines += ("v {!r} {!r} {!r}".format(*at) for at in self.points.tolist())
         patch = self.panels["patch"].tolist()
         for k, loop in enumerate(self.polygons):

@@ -17,6 +17,7 @@ from ..cloth.settings import CuttingOptions
 from ..design import Parameter, Target
 from ..design.targets import KINDS as KINDS_OF_PARAMETER
 from ..design.targets import MEASURES, SHORT
+from ..io.georeference import Georeference
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, WALL, RoomData
 from ..solvers import METHODS, find_method
@@ -55,6 +56,7 @@ EXAMPLES = {  # what to type for keys that must be given, and for some that a be
     "targets.meet.quantity": 'quantity = "apex"',
     "targets.vary.patch": 'patch = "west"',
     "output.files": 'files = ["roof.3dm"]',
+    "output.georeference.crs": 'crs = "EPSG:25832"',
 }
 OR_CURVE = ("plan.dividers", "plan.holes")  # a curve may replace these sections
 
@@ -237,6 +239,7 @@ def main_sections() -> tuple[Section, ...]:
         "zone": "Snow or wind on a part of the roof; those with the same case act together.",
         "pattern": "The cutting pattern that `pcmc pattern` writes, in the units of the surface.",
         "output": "What to write: all of it, or nothing. Without it nothing is written.",
+        "georeference": "Where the .ifc files are on a map.",
     }
     return (
         Section("", "The file: a plan and what to do with it.", root),
@@ -256,6 +259,7 @@ def main_sections() -> tuple[Section, ...]:
         Section("structure.zones", help_of["zone"], _of_class(Zone)),
         Section("pattern", help_of["pattern"], _of_class(CuttingOptions)),
         Section("output", help_of["output"], _of_class(Output)),
+        Section("output.georeference", help_of["georeference"], _of_class(Georeference)),
     )
 
 

@@ -46,12 +46,14 @@ def members_drawn(
     return () if model is None else drawn_members(model)
 
 
-def members_filed(outcome: Outcome) -> dict[str, Any]:
-    """The members and the cables' sections of the structural model, as ``io.write`` takes them."""
-    model = model_with_members(outcome, cables=True)
+def filed_besides(outcome: Outcome) -> dict[str, Any]:
+    """What files hold besides the surface, as ``io.write`` takes it: members and the cables' sections of the
+    structural model, and the place on a map."""
+    besides, model = {"georeference": outcome.output.georeference}, model_with_members(outcome, cables=True)
     if model is None:
-        return {}
-    return {"members": drawn_members(model) if model.members else (), "cable_areas": model.cable_areas}
+        return besides
+    members = drawn_members(model) if model.members else ()
+    return {**besides, "members": members, "cable_areas": model.cable_areas}
 
 
 def warn_of_members(outcome: Outcome, what: str, held: bool = False) -> None:

@@ -23,6 +23,7 @@ from ..cloth.sheets import TABLES as PATTERN_TABLES
 from ..drawings.drawing_set import NET_SUFFIXES, NET_TABLES, table_paths
 from ..drawings.drawing_set import SUFFIXES as DRAWINGS
 from ..drawings.sheet import FORMATS
+from ..io.georeference import Georeference
 from ..meshing.remeshing import check_lengths, remesh, size_note
 from ..panelling.panel_net import PATTERNS as NET_PATTERNS
 from ..panelling.panel_net import check_grid
@@ -36,7 +37,7 @@ PATCH_KEYS = ("tension", "pressure", "snow", "weight", "wall")  # of a patch of 
 BOUNDARY, GROUND = "boundary", "ground"
 WHEN = ("before", "after")
 COLOURS = ("patches", "curvature", "error", "reactions")
-CSV, INP = ".csv", ".inp"
+CSV, INP, IFC = ".csv", ".inp", ".ifc"
 SAME_WARP = 1.0  # degree: directions of [pattern] and [structure] that differ by less are one
 DOCUMENTS = {  # keys of files for those who build, with their suffixes and what they are
     "drawings": (DRAWINGS, "a drawing"),
@@ -178,6 +179,7 @@ class Output:
     pattern : files of the cutting pattern: .dxf, .pdf, .svg, .csv; needs the section [pattern].
     report : the report, .pdf; see ``pcmc report``.
     date : printed in the report, which reads no clock.
+    georeference : where the .ifc files are on a map: {crs = "EPSG:25832", eastings = ..., northings = ...}.
     """
 
     files: Sequence[PathLike] = ()
@@ -199,8 +201,12 @@ class Output:
     pattern: Sequence[PathLike] = ()
     report: PathLike | None = None
     date: str = ""
+    georeference: Any = field(default=None, metadata={"kind": "a table"})
 
     def __post_init__(self) -> None:
+        if isinstance(self.georeference, Mapping):
+            place = section_of(Georeference, "output.georeference", self.georeference)
+            object.__setattr__(self, "georeference", place)
         check_names(self.files, self.picture)
         check_picture(self.all_views, self.colour)
         validate.choice("sheet", self.sheet, tuple(FORMATS))
@@ -260,6 +266,9 @@ class Output:
 
     def check(self, units: Units, structure: Structure | None, pattern: CuttingOptions | None) -> None:
         """Refuse documents that need a unit of length or a section which the project does not have."""
+        if self.georeference and not any(Path(file).suffix.lower() == IFC for file in self.files):
+            text = 'georeference: is of .ifc files; name one, such as files = ["roof.ifc"], or leave it out'
+            raise OptionError(text, what="output.georeference")
         for key in ("drawings", "pattern", "net", "report"):
             if any(Path(file).suffix.lower() in (*DRAWINGS, *REPORTS) for file in self.files_of(key)):
                 expect_length(units.length, DOCUMENTS[key][1])

@@ -27,7 +27,7 @@ from ..structure import Analysis, StructuralModel, write_structure
 from ..surface import Surface, unfolded
 from .checking import in_file
 from .file import Project
-from .members import members_filed, warn_of_members
+from .members import filed_besides, warn_of_members
 from .outcome import OnStep, Outcome, ignore
 from .settings import check_picture, cost_paths, schedule_paths
 
@@ -83,13 +83,13 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
     members of the project.
     """
     paths = [*map(Path, files)]
-    holding = {path: io.FORMATS[path.suffix.lower()].members for path in paths}
-    members = members_filed(outcome) if any(holding.values()) else {}
+    holding = {path: io.FORMATS[path.suffix.lower()].besides for path in paths}
+    besides = filed_besides(outcome) if any(holding.values()) else {}
     for held in (True, False):
-        if some := [path.name for path in paths if holding[path] == held]:
+        if some := [path.name for path in paths if bool(holding[path]) == held]:
             warn_of_members(outcome, ", ".join(some), held)
     if outcome.result is not None:
-        return certified_files(*outcome.shown, paths, outcome.units, colour, members, outcome.mark)
+        return certified_files(*outcome.shown, paths, outcome.units, colour, besides, outcome.mark)
     data, about = outcome.data, dict[str, Any](units=outcome.units, colour=colour, mark=outcome.mark)
     about |= {"scalars": data.scalars, "certificate": data.certificate or None} if data else {}
     if outcome.unfold:
@@ -98,7 +98,8 @@ def surface_files(outcome: Outcome, files: Iterable[PathLike], colour: str = "")
         carried = {name: values[place[len(values)]] for name, values in about.get("scalars", {}).items()}
         about |= {"scalars": carried, "certificate": None}
     write = partial(io.write, surface=outcome.shown.surface, **about)
-    return [(path, partial(write, **members) if holding[path] else write) for path in paths]
+    more = {path: {key: besides[key] for key in keys if key in besides} for path, keys in holding.items()}
+    return [(path, partial(write, **more[path])) for path in paths]
 
 
 def certified_files(
@@ -107,11 +108,11 @@ def certified_files(
     files: Iterable[PathLike],
     units: Units,
     colour: str = "",
-    members: Mapping[str, Any] | None = None,
+    besides: Mapping[str, Any] | None = None,
     mark: str = "",
 ) -> FileJobs:
     """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
-    relative curvature error, size of the reactions at supports (force), and ``members_filed``; with the
+    relative curvature error, size of the reactions at supports (force), and ``filed_besides``; with the
     ``mark`` where the certificate has none."""
     scalars = {"mean curvature": mean_curvature(surface), "error": curvature_error(surface)}
     scalars["reaction"] = np.linalg.norm(certificate.reactions, axis=1)
@@ -122,7 +123,7 @@ def certified_files(
         about: dict[str, Any] = {"units": units, "colour": colour, "mark": certificate.mark or mark}
         about["scalars"] = form.carried(surface, scalars) | coloured
         about["certificate"] = certificate if form.certificate else None
-        about |= (members or {}) if form.members else {}
+        about |= {key: value for key, value in (besides or {}).items() if key in form.besides}
         jobs.append((file, partial(io.write, surface=surface, **about)))
     return jobs
 

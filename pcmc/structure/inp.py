@@ -60,7 +60,8 @@ def text_of(
     results of each increment, and writes none for viewers. A length of 1 in the file is ``unit`` in the
     model."""
     surface, nodes, certificate = model.standing, np.flatnonzero(model.nodes), model.certificate
-    heading = "pcmc structural model", certificate.mark or mark, certificate.verdict.value
+    mark = certificate.mark or mark
+    heading = "pcmc structural model", mark, certificate.verdict.value, certificate.part
     text = [f"*HEADING\n{'; '.join(filter(None, heading))}\n" + (f"** {model.note}\n" if model.note else "")]
     supports = certificate.supports[["support", "kind", "name"]].to_numpy().tolist()
     notes = [f"PATCH_{k}: {patch.name}" for k, patch in enumerate(surface.patches, 1)]

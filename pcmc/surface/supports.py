@@ -309,6 +309,12 @@ def mirror_edges(planes: Sequence[tuple[Plane, Bools]], topo: Topology) -> Bools
     return topo.boundary_edge & np.any([np.zeros(len(topo.edges), dtype=bool), *inside], axis=0)
 
 
+def part_of_roof(planes: Sequence[tuple[Plane, Bools]]) -> str:
+    """What a surface with these planes is of its roof, in words; empty for a whole roof."""
+    there = any(plane.mirror for plane, _ in planes)
+    return "part of a roof that goes on behind its mirror planes" if there else ""
+
+
 def symmetric_part(planes: Sequence[tuple[Plane, Bools]], vectors: Floats) -> Floats:
     """Leave of vectors (n,3) at vertices in mirror planes the part along all of these, in place.
 

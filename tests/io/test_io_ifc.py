@@ -8,6 +8,7 @@ import sys
 import ifcopenshell
 import numpy as np
 import pytest
+from ifcopenshell.util import geolocation
 from ifcopenshell.util.element import get_container, get_material, get_pset, get_psets
 from ifcopenshell.util.placement import get_local_placement
 from ifcopenshell.util.unit import calculate_unit_scale, get_project_unit
@@ -17,8 +18,9 @@ from tents import tent
 import pcmc
 from pcmc import cli
 from pcmc.base.errors import FileError, LostWarning, MissingExtra, OptionError
-from pcmc.base.units import FORCES, LENGTHS, Units
+from pcmc.base.units import FORCES, LENGTHS, Units, length_factor
 from pcmc.forces.functional import patch_areas
+from pcmc.io.georeference import Georeference
 from pcmc.plan import Plan, polyline
 from pcmc.structure import StructuralModel, drawn_members
 from pcmc.structure.columns import columns_at_rest
@@ -37,7 +39,11 @@ def test_the_validator_of_ifcopenshell_accepts_it(tmp_path):
     from generators import two_squares
 
     surface = tent(names=("Süd/Ost", "a.b", "κ_1 (2)"))
-    pcmc.write(tmp_path / "a.ifc", surface, certificate=pcmc.certify(surface), units=Units("mm", "kN"))
+    about = {
+        "units": Units("mm", "kN"),
+        "georeference": Georeference("EPSG:25832", 691e3, rotation=30.0),
+    }
+    pcmc.write(tmp_path / "a.ifc", surface, certificate=pcmc.certify(surface), **about)
     pcmc.write(tmp_path / "b.ifc", two_squares(4, alpha_aux=1.0), units=Units("ft", "kip"))
     text = (tmp_path / "b.ifc").read_text().replace(",.ROOF.)", ",.USERDEFINED.)")  # without an ObjectType
     (tmp_path / "wrong.ifc").write_text(text)
@@ -55,6 +61,38 @@ def test_the_validator_of_ifcopenshell_accepts_it(tmp_path):
     lines = run.stdout.splitlines()
     assert lines[:2] == ["No validation issues found."] * 2
     assert "CorrectPredefinedType" in lines[2]
+
+
+@pytest.mark.parametrize(("unit", "x"), [("m", 0.0), ("mm", 0.0), ("ft", 2e6)])
+def test_it_is_on_a_map(tmp_path, unit, x):
+    """Eastings and northings of a corner as IfcOpenShell finds them; far from zero, too, and turned."""
+    surface = Plan([[x, 0], [x + 4, 0], [x + 4, 3], [x, 3]], edge_length=2.0, tension=2.0).surface()
+    place = Georeference("EPSG:25832", 691_000.0, 5_334_000.0, 519.5, rotation=30.0)
+    pcmc.write(tmp_path / "a.ifc", surface, units=unit, georeference=place)
+    model = ifcopenshell.open(tmp_path / "a.ifc")
+    [crs] = model.by_type("IfcProjectedCRS")
+    assert (crs.Name, crs.MapUnit.Name) == ("EPSG:25832", "METRE")
+    assert calculate_unit_scale(model) == pytest.approx(length_factor(unit, "m"))
+    x, y, z = surface.vertices[0]
+    metre, turn = length_factor(unit, "m"), np.exp(1j * np.radians(30.0))
+    across = complex(691_000.0, 5_334_000.0) + metre * turn * complex(x, y)
+    expected = [across.real, across.imag, 519.5 + metre * z]
+    assert geolocation.auto_xyz2enh(model, x, y, z) == pytest.approx(expected, abs=1e-6)
+    with pytest.warns(LostWarning, match="cannot carry .*its place on a map"):
+        pcmc.write(tmp_path / "a.obj", surface, units=unit, georeference=place)
+
+
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        ({"crs": "UTM 32"}, "crs: expected a coordinate system such as \"EPSG:25832\", found 'UTM 32'"),
+        ({"crs": "EPSG:25832", "eastings": float("nan")}, "eastings: expected a finite number, found nan"),
+    ],
+)
+def test_a_place_that_is_on_no_map_is_refused(given, line):
+    with refused(OptionError, what=next(reversed(given))) as caught:
+        Georeference(**given)
+    assert str(caught.value) == line
 
 
 def test_members_have_profiles_and_the_volume_of_their_length(tmp_path):

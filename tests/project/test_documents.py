@@ -265,6 +265,29 @@ def test_files_have_the_mark_of_a_roof_that_is_not_in_order(tmp_path, monkeypatc
     io.read("roof.3dm")  # without a note on objects that are left out
 
 
+PART = "part of a roof that goes on behind its mirror planes"
+
+
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.LostWarning")
+def test_files_tell_that_they_hold_a_part_of_a_roof(tmp_path, monkeypatch):
+    """Where a program shows it, not only in the data that pcmc reads back; the whole roof has no mark."""
+    monkeypatch.chdir(tmp_path)
+    half = SMALL.replace("patches =", "mirrors = [[[4, 0], [4, 3]]]\npatches =")
+    names = [f"roof{suffix}" for suffix in MARKED if suffix != ".inp"]
+    output = f"[output]\nfiles = {names}\nstructure = 'roof.inp'\n"
+    (tmp_path / "roof.toml").write_text(UNITS + half + STRUCTURE + output, encoding="utf-8")
+    assert cli.main(["solve", "roof.toml", "--no-mesh-check"]) == 0
+    read_by = {suffix: read for suffix, read in MARKED.items() if suffix not in (".inp", ".pcmc")}
+    found = {suffix: read(Path(f"roof{suffix}")) for suffix, read in read_by.items()}
+    assert found == dict.fromkeys(read_by, PART)
+    assert Path("roof.inp").read_text().splitlines()[1].endswith(f"; {PART}")
+    assert f"\no {PART}\n" in Path("roof.obj").read_text()
+    assert ifcopenshell.open("roof.ifc").by_type("IfcProject")[0].Name == f"Roof, {PART}"
+    assert io.load("roof.obj").patches == io.load("roof.pcmc").patches
+    assert cli.main(["convert", "roof.pcmc", "whole.ifc", "--whole"]) == 0
+    assert ifcopenshell.open("whole.ifc").by_type("IfcProject")[0].Name == "Roof"
+
+
 @pytest.mark.parametrize("colour", ["patches", "curvature", "error", "reactions"])
 @pytest.mark.parametrize("views", [["plan"], ["plan", "elevation"]])
 def test_a_picture_of_any_colour_has_the_mark(monkeypatch, colour, views):

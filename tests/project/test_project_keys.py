@@ -7,13 +7,14 @@ import re
 import tomllib
 from pathlib import Path
 
+import ifcopenshell
 import pytest
 from refusals import refused
 from small_project import changed
 
 from pcmc import cli
 from pcmc.base.errors import FileError, PcmcError
-from pcmc.project import load, reference, sections
+from pcmc.project import load, reference, run, sections
 
 
 @pytest.mark.parametrize(
@@ -318,3 +319,44 @@ def test_meanings_speak_of_the_file_and_not_of_python():
         for key in section.keys:
             found = re.search(r"\b(None|True|False|PatchSpec|mapping|sequence|tuple)\b", key.help)
             assert found is None, f"{section.name}.{key.name}: {key.help}"
+
+
+PLACE = '[output.georeference]\ncrs = "EPSG:25832"\neastings = 691000.0\n'
+
+
+def test_the_place_on_a_map_is_in_the_file_of_ifc_alone(small):
+    changed(small, '"roof.obj"]', '"roof.obj", "roof.ifc"]\n' + PLACE)
+    files = run(small).files
+    model = ifcopenshell.open(next(path for path in files if path.suffix == ".ifc"))
+    [conversion] = model.by_type("IfcMapConversion")
+    assert (conversion.Eastings, conversion.Northings, conversion.XAxisAbscissa) == (691e3, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        (
+            '"roof.obj"]',
+            f'"roof.obj"]\n{PLACE}',
+            'georeference: is of .ifc files; name one, such as files = ["roof',
+        ),
+        (
+            '"roof.obj"]',
+            '"roof.ifc"]\ngeoreference = {}',
+            "needs the key 'crs', such as crs = \"EPSG:25832\"",
+        ),
+        (
+            '"roof.obj"]',
+            '"roof.ifc"]\ngeoreference = {crs = "25832"}',
+            "line 12: output.georeference: crs: expected",
+        ),
+        (
+            '"roof.obj"]',
+            '"roof.ifc"]\ngeoreference = {crs = "EPSG:25832", east = 1}',
+            "did you mean 'eastings'?",
+        ),
+    ],
+)
+def test_a_place_that_counts_for_nothing_is_refused(small, old, new, line):
+    with pytest.raises(FileError, match=re.escape(line)):
+        load(changed(small, old, new))
