@@ -155,7 +155,7 @@ def load(path: PathLike, *, units: str = "") -> Project:
         raise OptionError(text, what="units", found=units, expected=project.units.length)
     if units:
         project = replace(project, units=replace(project.units, length=units))
-    notes, plan, drawing = [], project.plan, project.drawing
+    plan, drawing, notes = project.plan, project.drawing, list[str]()
     if drawing is not None:
         notes += drawing.notes
     elif plan is not None:
