@@ -49,6 +49,15 @@ def deflated_newton(start: Surface, known: Sequence[Shape]) -> Result | None:
 
     It may be one of those known: where the way to the last steps is Newton's own.
     """
+    near = _deflated(start, known)
+    if near is None:
+        return None
+    result = solve_once(near, target="stationary")
+    return result if result.converged else None
+
+
+def _deflated(start: Surface, known: Sequence[Shape]) -> Surface | None:
+    """Where the deflated steps from a start come near to rest; None where they fail."""
     try:
         state = SolverState(start, MIN_QUALITY)
         stepper = Stepper(state, minimum=False)
@@ -56,33 +65,35 @@ def deflated_newton(start: Surface, known: Sequence[Shape]) -> Result | None:
             if not np.isfinite(state.energy) or state.quality < COLLAPSED:
                 return None
             if state.at.residual < NEAR:
-                break
-            stepper.drop_outdated()
-            second = stepper.factorise()
-            if second is None:
-                return None
-            d, pressures, _ = stepper.direction(second)
-            shapes = (Shape(state.at.X + t * d, state.at.classes.faces) for t in (0.0, DIFFERENCE))
-            here, ahead = (_repulsion(shape, known, state.size) for shape in shapes)
-            slope = (ahead - here) / DIFFERENCE
-            share = 1.0 / (1.0 - slope) if abs(1.0 - slope) > DIFFERENCE else 1.0 / DIFFERENCE
-            most = LONGEST * state.size / float(np.linalg.norm(d, axis=1).max())
-            share = float(np.clip(share, -most, most))
-            for t in (share * length for length in LENGTHS):
-                X, down = state.displaced(t * d)
-                if not state.spoils_triangles(X):
-                    state.change_pressures(t * pressures)
-                    state.move(X, down)
-                    break
-            else:
+                return state.result_surface()
+            if not _deflated_step(state, stepper, known):
                 return None
             state.maintain_mesh()
-        else:
-            return None
     except SingularMatrix:
-        return None
-    result = solve_once(state.result_surface(), target="stationary")
-    return result if result.converged else None
+        pass
+    return None
+
+
+def _deflated_step(state: SolverState, stepper: Stepper, known: Sequence[Shape]) -> bool:
+    """One step, shortened until it keeps the triangles; False if none does."""
+    stepper.drop_outdated()
+    second = stepper.factorise()
+    if second is None:
+        return False
+    d, pressures, _ = stepper.direction(second)
+    shapes = (Shape(state.at.X + t * d, state.at.classes.faces) for t in (0.0, DIFFERENCE))
+    here, ahead = (_repulsion(shape, known, state.size) for shape in shapes)
+    slope = (ahead - here) / DIFFERENCE
+    share = 1.0 / (1.0 - slope) if abs(1.0 - slope) > DIFFERENCE else 1.0 / DIFFERENCE
+    most = LONGEST * state.size / float(np.linalg.norm(d, axis=1).max())
+    share = float(np.clip(share, -most, most))
+    for t in (share * length for length in LENGTHS):
+        X, down = state.displaced(t * d)
+        if not state.spoils_triangles(X):
+            state.change_pressures(t * pressures)
+            state.move(X, down)
+            return True
+    return False
 
 
 def _repulsion(shape: Shape, known: Sequence[Shape], size: float) -> float:

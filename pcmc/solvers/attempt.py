@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import OptionError
-from ..base.tolerances import COLLAPSED, NOISE, POOR, ROUNDED_REST, SHRUNK
+from ..base.tolerances import AT_REST, COLLAPSED, NOISE, POOR, ROUNDED_REST, SHRUNK
 from ..forces.functional import patch_areas
 from ..meshing.quality import worst_quality
 from ..stability.equilibrium import SecondVariation
@@ -28,6 +28,7 @@ PATIENCE = 8  # steps without halving the residual, once it is that small
 DOWN = ("shifted", "saddle")  # kinds of steps where the second variation is indefinite
 SLOW_DESCENT_STEPS = (3, 30)  # that hardly lower E: when a saddle that slips is accepted, when any
 NEAR_SADDLE = 1e-3  # residual near a saddle
+SURE = 0.1  # of the residual at rest: below it, what rounding may leave is worth no further step
 MIN_ENERGY_DROP = 1e-6  # of Σ α A: by less E is hardly lowered in these steps
 
 
@@ -38,7 +39,8 @@ class NewtonOptions:
     Parameters
     ----------
     tolerance : converged when ‖Bᵀ∇E‖ ≤ tolerance × the norm of the single triangles' forces, or when it
-        is below 1e-10 of that norm and rounding lets no step lower it further.
+        is below 1e-10 of that norm and rounding lets no step lower it further, or below what rounding
+        of coordinates far from 0 leaves of it, and below 1e-9.
     iterations : the most steps of any kind, on each level and in each attempt. ``pcmc.solve`` ends its search
         where one takes as many as were asked for: with ``iterations=1`` there is one step in all.
     target : ``"minimum"`` leaves saddles; ``"stationary"`` converges to them.
@@ -191,10 +193,10 @@ class NewtonRun:
 
     def _at_rest(self) -> bool:
         """Whether the residual is below the tolerance, or as low as rounding lets it become."""
-        residual = self.state.at.residual
+        residual, rounding = self.state.at.residual, self.state.rounding
         no_progress = self.stuck or self.steps_since_best > PATIENCE
-        rounded = max(ROUNDED_REST, NOISE * self.state.rounding)
-        return residual <= self.options.tolerance or (residual <= rounded and no_progress)
+        least = max(ROUNDED_REST, NOISE * rounding) if no_progress else min(rounding, SURE * AT_REST)
+        return residual <= max(self.options.tolerance, least)
 
     def _leave_rest(self) -> bool:
         """Leave a saddle if a minimum is sought, or lift a resting junction; False if neither is due."""

@@ -12,11 +12,17 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
+from ..base.tolerances import COLLAPSED
+from ..meshing.quality import worst_quality
 from ..surface import Surface
 from .evaluate import Evaluator, Point
 from .result import Callback, Progress, Result, Status, until_stopped
 
 ORDINARY = 20  # powers of two from 1: NLopt's fixed numbers do no harm within
+COLLAPSES = (
+    "its triangles collapse, as that lowers E, which depends on where vertices lie along the surface, too;"
+    " method='newton' moves them across it only"
+)
 SAME_ENERGY = 1e-13  # of the energy: two energies closer than this are equal in floats
 
 
@@ -164,7 +170,8 @@ def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callb
 
     The ``history`` (``evaluation``, ``energy``, ``gradient_squared``) has a row for each evaluation, trials
     of the line search included: NLopt shows no more. The result is the surface of least energy seen, measured
-    once more where the last trial was not the best. Status STALLED when NLopt's line search finds no step.
+    once more where the last trial was not the best. Status STALLED when NLopt's line search finds no step:
+    on most roofs with walls or uneven triangles, as E falls without end where triangles collapse.
 
     >>> from pcmc import Patch, Surface
     >>> corners = [[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [0, 0, 1]]
@@ -179,5 +186,7 @@ def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callb
     if best is None or (rows[-1]["energy"], rows[-1]["gradient_squared"]) != (best.energy, best.squared):
         best = evaluate(surface.vertices if best is None else best.X)
         rows.append(evaluate.row(best))
-    surface, status = surface.moved(best.X), objective.status or status
-    return Result(surface, status, "lbfgs", best.energy, len(rows), evaluate.count, rows)
+    end, status = surface.moved(best.X), objective.status or status
+    before, after = (worst_quality(one.vertices, one.faces) for one in (surface, end))
+    note = COLLAPSES if status is not Status.CONVERGED and after < COLLAPSED <= before else ""
+    return Result(end, status, "lbfgs", best.energy, len(rows), evaluate.count, rows, note)

@@ -12,6 +12,7 @@ from shapes import cap, pyramid, shaken, three_patches
 from pcmc import Plane, energy, gradient, solve
 from pcmc.base.errors import OptionError
 from pcmc.forces.functional import energy_and_gradient, energy_at
+from pcmc.plan import plan_from
 from pcmc.solvers.evaluate import Evaluator
 from pcmc.solvers.lbfgs import Coordinates, LbfgsOptions, lbfgs
 from pcmc.solvers.result import Status
@@ -124,6 +125,16 @@ def test_numbers_beyond_the_floats_end_with_the_last_finite_surface(monkeypatch)
     assert result.status is Status.NON_FINITE
     assert np.isfinite(result.energy)
     assert np.isfinite(result.history.energy).all()
+
+
+def test_triangles_that_collapse_lower_the_energy_and_the_message_says_what_to_type():
+    outline = [[0, 0], [12, 0], [12, 8], [0, 8]]
+    surface = plan_from({"outline": outline, "edge_length": 1.0, "tension": 4.0}).surface()
+    result = solve(surface, "lbfgs")
+    assert result.status is Status.STALLED
+    assert result.energy < solve(surface).energy
+    assert "its triangles collapse, as that lowers E" in result.message
+    assert "method='newton'" in result.message
 
 
 def test_nothing_to_move():

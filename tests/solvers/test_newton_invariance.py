@@ -166,6 +166,7 @@ def test_drawn_in_a_survey_s_coordinates(name, shift):
     there = solve(rebuilt(surface, surface.vertices + shift, plane), target="stationary")
     here = solve(surface, target="stationary")
     assert there.converged
+    assert there.iterations <= here.iterations + 2  # it does not wait for what rounding hides
     assert there.certificate.residual < 1e-9
     assert there.certificate.verdict is here.certificate.verdict
     assert len(there.certificate.pinched) == len(here.certificate.pinched)
