@@ -230,7 +230,7 @@ def test_a_page_promises_advice_of_a_project_only_where_it_is_looked_for(tmp_pat
 
 
 CORNERED = """[plan]
-edge_length = 0.8
+edge_length = 1.1
 outline = [[0, 0], [20, 0], [10, 17]]
 dividers = [{curve = [[10, 6], [0, 0]]}, {curve = [[10, 6], [20, 0]]}, {curve = [[10, 6], [10, 17]]}]
 [plan.patches]
@@ -241,7 +241,7 @@ east = {apex = 2.5, at = [15, 7]}
 
 
 HALF = """[plan]
-edge_length = 0.8
+edge_length = 1.1
 outline = [[0, 0], [9, 0], [9, 10], [0, 10]]
 mirrors = [[[9, 0], [9, 10]]]
 dividers = [{curve = [[4, 0], [4, 10]], wall = 3.5}]

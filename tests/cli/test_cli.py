@@ -167,8 +167,13 @@ def test_sweep(folder, capsys):
     assert cli.main([*given, "--store", "s.sqlite"]) == 0
     assert pd.read_csv("t.csv")["alpha_aux"].tolist() == [0.5, 1.0]
     assert cli.main([*given, "--store", "s.sqlite"]) == 0  # nothing is left to do
-    assert cli.main([*given, "--method", "nesterov", "iterations=2"]) == 1
     assert "stable" in capsys.readouterr().out
+
+
+@pytest.mark.nightly
+def test_a_sweep_of_roofs_that_are_not_at_rest_is_1(folder):
+    given = ["sweep", "generators:two_squares", "alpha_aux=0.5,1", "--workers", "1"]
+    assert cli.main([*given, "--method", "nesterov", "iterations=2"]) == 1
 
 
 def test_explore_serves_a_file_and_an_example(solved, monkeypatch):

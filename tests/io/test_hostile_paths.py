@@ -69,6 +69,8 @@ def test_a_file_that_the_disk_has_no_room_for_is_not_there(tmp_path, suffix):
     resource = pytest.importorskip("resource")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     surface = expected()
+    pcmc.write(tmp_path / f"a{suffix}", surface)  # its module is compiled by now
+    (tmp_path / f"a{suffix}").unlink()
     resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))
     try:
         with pytest.raises(FileError) as caught:

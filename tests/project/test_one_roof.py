@@ -215,7 +215,7 @@ def solved(text, name="mesh.toml"):
 
 
 def test_a_remeshed_roof_gets_its_curved_elements_at_the_end(folder):
-    text = WITH_UNITS + "[solve]\norder = 2\n[remesh]\nedge_length = 0.8\n"
+    text = WITH_UNITS + "[solve]\norder = 2\n[remesh]\nedge_length = 1.2\n"
     (folder / "curved.toml").write_text(text, encoding="utf-8")
     found = project.run("curved.toml")
     assert (found.good, found.surface.order) == (True, 2)

@@ -223,6 +223,14 @@ def test_a_surface_is_frozen_and_owns_its_arrays():
         surface.plane = Plane()
 
 
+def test_arrays_in_the_order_of_columns_are_kept_in_that_of_rows():
+    """As loops read them, which are otherwise compiled once more."""
+    columns = {name: np.asfortranarray(SQUARE[name]) for name in ("vertices", "faces")}
+    surface = Surface(**SQUARE | columns)
+    assert surface.faces.tolist() == SQUARE["faces"]
+    assert all(array.flags.c_contiguous for array in (surface.vertices, surface.faces))
+
+
 def test_moved_keeps_everything_but_the_positions():
     surface = three_patches()
     moved = surface.moved(2.0 * surface.vertices)
