@@ -140,7 +140,7 @@ def test_heights_masts_and_levels(tmp_path):
     np.testing.assert_allclose(plan.supports, [[8, 3, 2]])
     assert list(plan.holes) == ["ring"]
     assert plan.flat
-    with pytest.warns(FileWarning, match="draw a mast's top as a ring"):
+    with pytest.warns(FileWarning, match="draw a circle of radius 0.56 around"):
         loaded = project.load(file)
     assert [(t.quantity, t.of, t.value) for t in loaded.targets] == [
         ("height", (2.0, 3.0), 1.1),
