@@ -30,10 +30,11 @@ STILL = 1e-8  # of its size: moves up to here are none
 MATTERS = 0.1  # of what a refinement adds to the shape: smaller moves show no trend (0.7 and more where
 # the mesh holds a surface, 0.15 to 2 where it converges, below 0.03 on meshes of symmetric minimal surfaces)
 CONTACT = 1.5  # order where a rest ends: beside it a junction rises as the distance to the power of 3/2
+BEGINS = 1.0  # order where a rest begins: it grows from nothing, by whole edges
 RESTED = 0.1  # of a junction's length: a smaller change of contact is none
 REACH = 0.3  # of a junction's length: this near to it a place belongs to it
 LIMIT = 0.5**LOWEST  # of the step before: what moves by less has a limit in sight, as for error bars
-FURTHER = 3  # meshes ahead at which an eigenvalue that only falls, or a line that leans, is foreseen
+FURTHER = 3  # meshes ahead at which an eigenvalue that only falls, a line that leans, or a rest is foreseen
 RUNNING_AWAY = {Status.DIVERGED: "it inflates without bound", Status.VANISHED: "it shrinks to nothing"}
 
 
@@ -106,15 +107,19 @@ def shape_order(surfaces: Sequence[Surface]) -> float:
     Infinite with fewer than three meshes, or where the last move is none beside the error of the shape: a
     coarse mesh may be at rest on the smooth surface itself, so that first moves are small and later ones
     larger. The error is how far the last refinement's new vertices are from the middles of their edges.
-    At most 3/2 where a junction rests on its bottom, or will on finer meshes: that where its rest ends.
+    At most 3/2 where a junction rests on its bottom on all of these meshes, or will on far finer ones: that
+    where its rest ends. At most 1 where it begins to rest on these meshes, or will on the next ones.
     """
     order = _order(surfaces, [_moves(a, b) for a, b in pairwise(surfaces[-3:])])
     if len(surfaces) < 3 or surfaces[0].periodic:
         return order
     # at an end it rises as c s - k s log(1/s): by k log 2 less on each finer mesh, until it rests
-    before, last = (_end_slopes(surface)[: surfaces[-2].n] for surface in surfaces[-2:])
-    rests = standing_part(surfaces[-1]).resting.any() or (last < before).any()
-    return min(order, CONTACT) if rests else order
+    slopes = np.array([_end_slopes(surface)[: surfaces[-2].n] for surface in surfaces[-2:]])
+    before, last = slopes[:, np.isfinite(slopes).all(axis=0)]
+    rests = [bool(standing_part(surface).resting.any()) for surface in surfaces[-3:]]
+    if not all(rests) and (any(rests) or (last <= FURTHER * (before - last)).any()):
+        return min(order, BEGINS)
+    return min(order, CONTACT) if all(rests) or (last < before).any() else order
 
 
 def _end_slopes(surface: Surface) -> Floats:

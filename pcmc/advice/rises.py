@@ -271,18 +271,22 @@ def ring_lines(masts: Sequence[Mast], share: float, *, drawn: bool) -> list[str]
     return lines
 
 
-def mast_note(plan: Plan) -> str:
-    """Warn about a roof held at single points, with the change to make; empty if it is not."""
+def mast_note(plan: Plan, *, drawn: bool = False) -> str:
+    """Warn about a roof held at single points, with the change to type, or to draw; empty if it is not."""
     masts = point_masts(plan)
     if not masts:
         return ""
     points = ", ".join(mast.text for mast in masts[:4])
-    curve = ring_lines(masts[:1], max(mast.share for mast in masts), drawn=False)[2]
-    change = f"hold it on a ring, in [[plan.holes]], instead: {curve}"
+    ring = ring_lines(masts[:1], max(mast.share for mast in masts), drawn=drawn)
+    change = (
+        f"hold it on a ring instead: {ring[0]}"
+        if drawn
+        else f"hold it on a ring, in [[plan.holes]], instead: {ring[2]}"
+    )
     if cut := [mast for mast in masts if mast.in_mirror]:  # the outline is to leave out its half
         radius = f"of radius {cut[0].radius(cut[0].share):g} around {cut[0].text}"
         change = f"hold it on a ring instead: lead the outline around it on an arc {radius},"
-        change += " from mirror to mirror, and give that arc, with its height, in supports"
+        change += " from mirror to mirror, and give that arc, with its height, as a support"
     if tight := [mast for mast in masts if not mast.has_room]:
         change = f"{tight[0].text} is too near to what is held beside it for a ring: move it there, or away"
     return (

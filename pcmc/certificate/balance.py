@@ -165,7 +165,8 @@ def unbalanced(surface: Surface, pinchable: Bools, share: float = 1.0 + EXCESS) 
         *others, largest = sorted(surface.tensions[sheets])
         excused = pinchable[strongest] or held[curve.vertices].all() or surface.weights[sheets].any()
         excused = excused or np.isin(edges, on_cable).any() or surface.uncancelled[edges].any()
-        if largest > share * sum(others) and not excused:
+        most = share if len(others) > 1 else 1.0 + EXCESS  # two of one tension go on into each other
+        if largest > most * sum(others) and not excused:
             names = tuple(surface.patches[i].name for i in sheets)
             remedy = _remedy(surface, sheets)
             return UnbalancedJunction(names, float(largest), tuple(float(t) for t in others), remedy)

@@ -254,8 +254,10 @@ def sweep(
     """
     inputs = files_of(what) if Path(what).exists() else ()
     check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)
-    if csv is not None and suffix_of(csv, TABLES, "a table") == ".parquet":
-        require("pyarrow")
+    if csv is not None:
+        suffix_of(csv, TABLES, "a table")
+    if plot is not None:
+        require("matplotlib", extra="plot")
     if every and csv is None:
         raise OptionError("--all: is of the table in a file; name it with --csv", what="--all")
     check_names((), plot)

@@ -130,7 +130,8 @@ class CutMesh:
         both = np.intersect1d(self.pieces.piece[first], self.pieces.piece[last])
         if not len(both):
             places = " to ".join(point_text(self.X[vertex]) for vertex in (start, end))
-            text = f"{name}: from {places} it crosses another seam, a ridge or a cable; end it there"
+            text = f"{name}: from {places} it crosses another seam, a ridge or a cable"
+            text += f"{self._crossed(start, end)}; end it there"
             raise OptionError(text, what="seams", where=number)
         if (wanted := np.isin(both, self.pieces.piece[faces])).any():
             both = both[wanted]
@@ -152,6 +153,15 @@ class CutMesh:
             weights, away = nearest_places(self.X[edges[:, [0, 1, 1]]], point)
             place[k], share[k] = edges[away.argmin()], 1.0 - weights[away.argmin(), 0]
         return self._along(place, share, path, number, name)
+
+    def _crossed(self, start: int, end: int) -> str:
+        """Where a cut comes nearest to the line between two vertices, but for its ends, in words."""
+        cut = self.X[np.unique(self.cuts)] - self.X[start]
+        line = self.X[end] - self.X[start]
+        share = cut @ line / (line @ line)
+        cut = cut[np.abs(share - 0.5) < 0.49]
+        away = np.linalg.norm(np.cross(cut, line), axis=1)
+        return f" near {point_text(self.X[start] + cut[away.argmin()])}" if len(cut) else ""
 
     def _along(self, place: Ints, share: Floats, path: Floats, number: int, name: str) -> CutMesh:
         """The mesh with the points of a path as vertices, and the edges between them cut. An inner vertex

@@ -24,7 +24,7 @@ METHODS: tuple[Method, ...] = ("cotangent", "variational")
 
 
 def mean_curvature(surface: Surface, method: Method = "cotangent") -> Floats:
-    """H (n,), 1/length; NaN on junctions, boundaries and cables, and where sheets touch: no single
+    """H (n,), 1/length; NaN on junctions, boundaries, cables and supports, and where sheets touch: no single
     sheet has a curvature there.
 
     With ∇A the area gradient (15a) and ∇V = ⅓ Σ A_T ν_T the volume gradient of the vertex:
@@ -130,15 +130,13 @@ def curvature_error(surface: Surface, method: Method = "cotangent") -> Floats:
 
 
 def _within_one_sheet(surface: Surface) -> Bools:
-    """(n,) vertices off boundaries, junctions and cables, and where sheets do not just touch.
+    """(n,) vertices off boundaries, junctions, cables and supports, and where sheets do not just touch.
 
-    The boundary in a mirror plane is none. In another plane that holds a sheet, such as that of an upright
-    wall, the plane takes what acts across it, and the sheet is flat whatever its pressure.
+    The boundary in a mirror plane is none. Any other support takes what the sheet pulls there, such as the
+    plane of an upright wall or a mast inside.
     """
     topo = surface.topology
-    inside = np.ones(surface.n, dtype=bool)
+    inside = ~surface.supported
     inside[topo.edges[topo.curve_edge & ~surface.mirror_edge]] = False
     inside[surface.cable_edges.ends] = False
-    for plane, mask in surface.on_planes:
-        inside &= plane.mirror | ~mask
     return surface.spread(inside & (topo.fans == 1))

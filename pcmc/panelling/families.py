@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Bools, Floats, Ints
 from ..base.compiled import compiled
 from ..surface import Surface
 from ..surface.geometry import edge_vectors
@@ -20,6 +20,7 @@ MOST_WINDOWS = 256  # places of a cube that are tried for each family
 ROUNDS = 60  # of the search for fewer families
 WORK = 200_000_000  # triangles × families × rounds: large meshes get fewer rounds
 SHARE = 0.25  # of the families that are dissolved in each round
+STEPS = 1e9  # in a tolerance: lengths are rounded to a step, so that equal ones are equal
 TURNS = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])  # the edges counter-clockwise, from each of them
 
 
@@ -37,7 +38,9 @@ def triangle_families(lengths: Floats, tolerance: float, apart: bool = False) ->
     In a family, corresponding edges of every two triangles differ in length by at most ``tolerance``.
     ``apart``: mirror images count as different, so edges correspond counter-clockwise.
 
-    The families depend on the lengths alone, not on the order of triangles or the edge that each starts with.
+    The families depend on the lengths alone, not on the order of triangles or the edge that each starts with,
+    nor on the rounding of equal lengths, as in a roof that is turned. Where two edges are equal, ``order`` is
+    counter-clockwise: such a triangle is its own mirror image.
     ``at_least`` counts triangles of which no two can share a family.
 
     >>> triangles = np.array([[3, 4, 5.0], [4, 5, 3.001], [5, 4, 3.0]])
@@ -46,7 +49,12 @@ def triangle_families(lengths: Floats, tolerance: float, apart: bool = False) ->
     >>> triangle_families(triangles, 0.01, apart=True).family.tolist()
     [0, 0, 1]
     """
+    lengths, tolerance = np.round(lengths / tolerance * STEPS), STEPS
     orders = np.argsort(lengths, axis=1, kind="stable")[:, None]  # (m,w,3) that are tried: these differ least
+    ascending = np.take_along_axis(lengths, orders[:, 0], axis=1)
+    for pair in ([0, 1], [1, 2]):  # equal edges, counter-clockwise
+        turned = clockwise(orders[:, 0]) & (ascending[:, pair[0]] == ascending[:, pair[1]])
+        orders[turned, 0, pair[0]], orders[turned, 0, pair[1]] = orders[turned, 0][:, pair[::-1]].T
     if apart:  # the three turns, the least one first
         turned = lengths[:, TURNS]
         orders = TURNS[np.lexsort((turned[..., 2], turned[..., 1], turned[..., 0]), axis=1)]
@@ -62,6 +70,11 @@ def triangle_families(lengths: Floats, tolerance: float, apart: bool = False) ->
     number = np.empty(len(count), dtype=np.int64)  # families of one size by their smallest lengths
     number[np.lexsort((least[:, 2], least[:, 1], least[:, 0], -count))] = np.arange(len(count))
     return Families(number[family], order, at_least)
+
+
+def clockwise(order: Ints) -> Bools:
+    """(m,) whether edges in this order (m,3) run clockwise, where 0, 1, 2 is counter-clockwise."""
+    return np.asarray((order[:, 1] - order[:, 0]) % 3 == 2)
 
 
 def family_of_face(surface: Surface) -> Floats:

@@ -18,7 +18,7 @@ from ..certificate.tables import head_text
 from ..surface import Surface, expect_surface
 from ..surface.geometry import area_vectors, edge_vectors, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
-from .families import triangle_families
+from .families import STEPS, clockwise, triangle_families
 
 MIRROR_IMAGES = ("alike", "apart")
 SHOWN = 12  # families that ``print`` shows
@@ -167,7 +167,7 @@ def panels(
     corners = surface.vertices[surface.faces[faces]]
     lengths = np.linalg.norm(edge_vectors(corners), axis=2)
     family, order, at_least = triangle_families(lengths, tolerance, mirror_images == "apart")
-    table = _panel_table(surface, faces, lengths, family, order)
+    table = _panel_table(surface, faces, lengths, family, order, tolerance)
     groups = table.groupby("family")
     least, most = groups[["a", "b", "c"]].min(), groups[["a", "b", "c"]].max()
     counts = pd.DataFrame({"count": groups.size(), "mirrored": groups["mirrored"].sum()})
@@ -177,11 +177,14 @@ def panels(
     return Panels(surface, tolerance, mirror_images, certificate, *tables, laid_flat(corners), at_least)
 
 
-def _panel_table(surface: Surface, faces: Ints, lengths: Floats, family: Ints, order: Ints) -> pd.DataFrame:
+def _panel_table(
+    surface: Surface, faces: Ints, lengths: Floats, family: Ints, order: Ints, tolerance: float
+) -> pd.DataFrame:
     aligned = pd.DataFrame(np.take_along_axis(lengths, order, axis=1))
     mean = aligned.groupby(family).transform("mean").to_numpy()
-    order = np.take_along_axis(order, np.argsort(mean, axis=1, kind="stable"), axis=1)  # the edges by length
-    over = pd.Series((order[:, 1] - order[:, 0]) % 3 == 2)  # its edges ascend clockwise
+    by_length = np.argsort(np.round(mean / tolerance * STEPS), axis=1, kind="stable")
+    order = np.take_along_axis(order, by_length, axis=1)
+    over = pd.Series(clockwise(order))
     table = pd.DataFrame({"panel": np.arange(len(faces)) + 1, "face": faces})
     table["patch"] = [surface.patches[k].name for k in surface.patch_of_face[faces]]
     table["family"], table["mirrored"] = family + 1, over != (over.groupby(family).transform("mean") > 0.5)

@@ -110,9 +110,18 @@ def _ends(tree: LineTree, snap: float) -> Iterator[Cut]:
     for end, xy, places, inner in zip(ends, at, tree.at(at, snap), within, strict=True):
         one, passing = tree.lines[end[0]], [place for place in places if place[0] != end[0]]
         if one.kind is Kind.DIVIDER and not passing and inner:
-            gap, nearest = min((float(o.nearest(xy[None])[1][0]), o.name) for o in tree.lines if o is not one)
-            problem = f"ends at {point_text(xy)} without reaching another line; {nearest} is nearest,"
-            raise one.error(f"{problem} {gap:.3g} away: extend the divider to it", tuple(xy.tolist()), gap)
+            others = [other for other in tree.lines if other is not one]
+            gap, line = min((float(other.nearest(xy[None])[1][0]), other.name) for other in others)
+            where = f"{line} is nearest, {gap:.3g} away: let it end there"
+            if gap * SNAP > snap:  # by more than an edge: it was to go on, and the nearest may lie behind it
+                along = xy - one.xy[1 if end[1] == 0.0 else -2]
+                far = xy + along / np.linalg.norm(along) * 2.0 * np.ptp(tree.lines[0].xy, axis=0).sum()
+                ahead = shapely.intersection(shapely.LineString([xy, far]), [other.shape for other in others])
+                away = shapely.distance(shapely.Point(xy), ahead)  # NaN where it meets none
+                gap, line = float(np.nanmin(away)), others[np.nanargmin(away)].name
+                where = f"straight on, {line} is {gap:.3g} away: extend the divider to it"
+            text = f"ends at {point_text(xy)} without reaching another line; {where}"
+            raise one.error(text, tuple(xy.tolist()), gap)
         yield [end, *passing]
 
 

@@ -297,12 +297,6 @@ class _Reader:
             return float(steps) if (away <= self.gap).all() else math.nan
 
         heights, tops = [above(support) for support in supports], [above(top) for top in masts]
-        if any(map(math.isnan, tops)):
-            self.notes.append(
-                "layer 'mast': a roof held at a point has a peak there as thin as the triangles, which comes"
-                " to rest on some meshes and not on others; draw a mast's top as a ring, and the roof is the"
-                " same on all"
-            )
         if not all(map(math.isnan, tops)) or np.nanmax([0.0, *heights]) > ON * self.size:
             return True
         if not cables and not all(map(math.isnan, heights)):

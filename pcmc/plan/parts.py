@@ -244,10 +244,13 @@ def edge_cable(part: Any, what: str) -> dict[str, Any]:
     """The cable along the edge of a plan or a hole; refused without ``edge = "cable"``, missing with it."""
     if part.edge == "cable" and part.cable is None:
         message = f'{what}: edge = "cable" needs the tension of the cable, such as cable = 10.0'
-        raise OptionError(message, what="cable", where=what)
+        raise OptionError(message, what="cable", where=what, found=part.edge)
     if part.edge != "cable" and part.cable is not None:
-        message = f'{what}: cable = {validate.shown(part.cable)} needs edge = "cable", found "{part.edge}"'
-        raise OptionError(message, what="edge", where=what, found=part.edge, expected="cable")
+        message = (
+            f"{what}: cable = {validate.shown(part.cable)} is of a free edge, and this one is {part.edge};"
+        )
+        message += ' type edge = "cable" beside it, or leave it out'
+        raise OptionError(message, what="edge", where=what, found=part.cable, expected="cable")
     return _cable(part, what)
 
 

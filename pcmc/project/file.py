@@ -155,13 +155,17 @@ def load(path: PathLike, *, units: str = "") -> Project:
         raise OptionError(text, what="units", found=units, expected=project.units.length)
     if units:
         project = replace(project, units=replace(project.units, length=units))
-    if project.drawing is not None and project.drawing.notes:
-        text = f"{project.drawing.path}: {'; '.join(project.drawing.notes)}"
+    plan, drawing, notes = project.plan, project.drawing, list[str]()
+    if drawing is not None:
+        notes += drawing.notes
+    elif plan is not None:
+        width = float(np.ptp(plan.outline.at(plan.outline.dense), axis=0).max())
+        notes.append(unlikely_size(width, project.units.length))
+    if plan is not None:
+        notes.append(mast_note(plan, drawn=drawing is not None))
+    if notes := [*filter(None, notes)]:
+        text = f"{path if drawing is None else drawing.path}: {'; '.join(notes)}"
         warnings.warn(text, FileWarning, stacklevel=2)
-    elif project.drawing is None and project.plan is not None:
-        width = float(np.ptp(project.plan.outline.at(project.plan.outline.dense), axis=0).max())
-        for note in filter(None, (mast_note(project.plan), unlikely_size(width, project.units.length))):
-            warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
     return project
 
 
@@ -349,8 +353,12 @@ def with_rise(project: Project, wanted: Mapping[str, float | None]) -> Project:
     flag, *others = (f"--{rise.kind.replace('_', '-')}" for rise in rises)
     if others:
         raise OptionError(f"{flag} and {others[0]}: give one of them, the other follows", what=flag)
-    if project.targets or (project.mesh is not None and project.mesh.rises):
-        raise OptionError(f"{flag}: {project.path.name} has targets already; change them there", what=flag)
+    own = project.rises or (() if project.mesh is None else project.mesh.rises)
+    if project.targets or own:
+        has = (
+            f"{own[0].kind} = {own[0].value:g} already; change it" if own else "targets already; change them"
+        )
+        raise OptionError(f"{flag}: {project.path.name} has {has} there", what=flag)
     if project.mesh is not None:
         if rises[0].kind not in RISES:
             raise OptionError(f"{flag}: is for a plan, and here is a mesh; give --rise or --apex", what=flag)

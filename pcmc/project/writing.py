@@ -16,6 +16,7 @@ from .. import io
 from ..base.errors import FileError, FileWarning, PcmcError
 from ..base.files import PathLike, atomic_writes, check_name, system_error, writing
 from ..base.interrupts import defer_interrupts
+from ..base.libraries import require
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..cloth.sheets import pattern_files
@@ -31,6 +32,14 @@ from .members import filed_besides, warn_of_members
 from .outcome import OnStep, Outcome, ignore
 from .settings import check_picture, cost_paths, schedule_paths
 
+WRITERS = (  # libraries that some formats need, whatever is in the file, with their extras
+    ("trimesh", "files", (".glb", ".gltf")),
+    ("pyvista", "files", (".vtp", ".vtu")),
+    ("rhino3dm", "files", (".3dm",)),
+    ("ifcopenshell", "ifc", (".ifc",)),
+    ("ezdxf", "cad", (".dxf",)),
+    ("pyarrow", "files", (".parquet",)),
+)
 FileJob = tuple[Path, Callable[[Path], Any]]  # a file with the function that writes it
 FileJobs = list[FileJob]
 
@@ -210,8 +219,13 @@ def draw_picture(
 
 
 def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: Iterable[Path] = ()) -> None:
-    """Refuse, before any work, paths that cannot be written, and those of a command's own ``inputs``, also
-    by links and other ways to write them. The folder ``made`` may be missing."""
+    """Refuse, before any work, paths that cannot be written, as a library is missing, too; and those of a
+    command's own ``inputs``, also by links and other ways to write them. The folder ``made`` may be missing.
+    """
+    paths = list(paths)
+    for library, extra, suffixes in WRITERS:
+        if any(path.suffix.lower() in suffixes for path in paths):
+            require(library, extra=extra)
     seen, read = set(), [path for path in inputs if path.exists()]
     if made is not None and made.exists() and not made.is_dir():
         raise FileError(f"{made} is a file; the output needs a folder", what=str(made))

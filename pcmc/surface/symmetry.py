@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import combinations, count
 from typing import NamedTuple, TypeVar, cast
 
 import numpy as np
@@ -274,9 +275,7 @@ def _group(planes: Sequence[Plane], surface: Surface) -> tuple[list[Image], list
             if not len(same):
                 images.append(new)
         if len(images) > MOST_IMAGES:
-            text = "the images in the mirror planes never end: some planes are parallel, or no whole number"
-            hint = "name those to unfold at: mirrored(surface, planes=[…])"
-            text += f" of images fits around their line; {hint}"
+            text = f"the images in the mirror planes never end: {_endless(planes)}"
             raise SurfaceError(text, what="planes", found=len(images))
     for image in images:
         for plane in planes:
@@ -286,6 +285,18 @@ def _group(planes: Sequence[Plane], surface: Surface) -> tuple[list[Image], list
                 text += " must meet at 180° over a whole number, with the surface between them"
                 raise SurfaceError(text, what="planes", where=str(plane))
     return images, [np.array(numbers) for numbers in next_to]
+
+
+def _endless(planes: Sequence[Plane]) -> str:
+    """Why the images of these planes never end, and what to change."""
+    for one, other in combinations(planes, 2):
+        normal, second = np.array(one.normal), np.array(other.normal)
+        angle = math.degrees(math.atan2(np.linalg.norm(np.cross(normal, second)), abs(normal @ second)))
+        nearest = 180.0 / round(180.0 / angle) if angle > 2.0 else angle  # to parallel planes there is none
+        if abs(angle - nearest) > math.degrees(PARALLEL):
+            text = f"the {one} and the {other} meet at {angle:.9g}°, not at 180° over a whole number such as"
+            return f"{text} {nearest:.9g}°; give the ends of the mirrors with all digits"
+    return "some planes are parallel; name those to unfold at: mirrored(surface, planes=[…])"
 
 
 def _joined(chosen: Bools, next_to: Sequence[Ints]) -> Ints:

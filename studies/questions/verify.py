@@ -115,33 +115,36 @@ def table(folder: Folder) -> dict[str, float]:
 
 
 def figure(folder: Folder) -> None:
-    """Radius and gap against the number of triangles, by group."""
+    """Radius and gap against the number of triangles, a column for each group."""
     from pcmc.plot.curves import MARKERS
     from pcmc.plot.figure import CURVES, INK, SMALL, TEXT, finish, new, style
 
     rows = folder.read_table("theorems")
     proved = rows[rows["proved"]].copy()
     proved["radius"] /= proved["size"]
-    picture = new(1200, 560, pad=8.0)
-    panels = picture.subplots(1, 2)
+    groups = proved.groupby("group", sort=False)
+    picture = new(1200, 760)
     kinds = (("radius", "radius / size of the surface"), ("gap", "gap of the eigenvalues, force/length"))
-    for axes, (key, title) in zip(panels, kinds, strict=True):
-        style(axes)
-        for k, (group, part) in enumerate(proved.groupby("group", sort=False)):
-            for number, (_, ladder) in enumerate(part.groupby("name", sort=False)):
+    panels = picture.subplots(len(kinds), groups.ngroups, sharex=True, sharey="row", squeeze=False)
+    for line, (key, label) in zip(panels, kinds, strict=True):
+        for k, (axes, (group, part)) in enumerate(zip(line, groups, strict=True)):
+            style(axes)
+            for _, ladder in part.groupby("name", sort=False):
                 axes.plot(
                     ladder["triangles"],
                     ladder[key],
                     color=CURVES[k],
                     marker=MARKERS[k],
-                    markersize=4.0,
+                    markersize=3.0,
                     linewidth=0.7,
-                    label=group if number == 0 and axes is panels[0] else None,
+                    alpha=0.8,
                 )
-        axes.set(xscale="log", yscale="log")
-        axes.set_title(title, fontsize=TEXT, color=INK)
-        axes.set_xlabel("triangles", fontsize=TEXT, color=INK)
-    picture.legend(loc="outside right upper", fontsize=SMALL, frameon=False, labelcolor=INK)
+            axes.set(xscale="log", yscale="log")
+            if key == "radius":
+                axes.set_title(group, fontsize=TEXT, color=INK)
+            else:
+                axes.set_xlabel("triangles", fontsize=SMALL, color=INK)
+        line[0].set_ylabel(label, fontsize=SMALL, color=INK)
     finish(picture, folder.figure("theorems"))
 
 

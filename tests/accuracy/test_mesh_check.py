@@ -318,6 +318,19 @@ def test_the_study_s_bars_hold_the_true_errors(tmp_path):
 # ---- the command, projects and sweeps ------------------------------------------------------------
 
 
+def test_bars_count_that_a_junction_begins_to_rest_on_the_finest_mesh():
+    """What the coarser ones show is another way of standing: its order tells nothing of what is to come."""
+    divider = Divider({"arc": [[5.04, 0], [5.79, 3.42], [5.92, 6.84]]}, wall=2.4)
+    corners = [[0, 0], [9.68, 0], [10.56, 6.84], [0, 6.84]]
+    first = check_mesh(solve(Plan(corners, [divider], edge_length=0.98, tension=3.31).surface()))
+    assert [standing_part(surface).resting.any() for surface in first.surfaces] == [False, False, True]
+    truth = check_mesh(first.surfaces[-1])
+    for name in ("patch 1", "patch 2"):
+        (bar, limit), finer = first.row("height", name)[["limit_error", "limit"]], truth.row("height", name)
+        assert abs(limit - finer.limit) <= bar + finer.limit_error
+        assert bar < 0.01 * limit
+
+
 def test_bars_count_that_a_junction_will_rest_on_its_bottom():
     """It does on the fifth mesh; on each before it rises less at its ends, and orders seem better."""
     corners = [[4.279, -0.593], [1.957, 5.107], [-2.269, 3.567], [-4.675, 1.009], [-2.668, -4.268]]

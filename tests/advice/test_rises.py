@@ -154,6 +154,9 @@ def test_the_command_takes_a_rise(given, tmp_path, capsys):
     assert "apex 1.2" in capsys.readouterr().out
     assert cli.main(["solve", str(path), "--rise", "1.2", "--apex", "2"]) == 2
     assert "--rise and --apex: give one of them" in capsys.readouterr().err
+    path.write_text(path.read_text().replace("tension = 9.0", "rise = 1.5"))
+    assert cli.main(["solve", str(path), "--rise", "1.2"]) == 2
+    assert f"--rise: {path.name} has rise = 1.5 already; change it there" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

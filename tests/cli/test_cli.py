@@ -393,6 +393,27 @@ def test_without_shapely_plans_alone_are_refused(folder):
     assert refused.stderr.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("library", "command", "extra"),
+    [
+        ("trimesh", ["solve", "roof.toml", "-o", "roof.glb"], "files"),
+        ("ezdxf", ["draw", "roof.toml", "-o", "roof.dxf"], "cad"),
+        ("matplotlib", ["sweep", "roof.toml", "roof.tension=2,3", "--plot", "roof.svg"], "plot"),
+    ],
+)
+def test_a_library_of_the_output_is_missed_before_the_work(
+    folder, monkeypatch, capsys, library, command, extra
+):
+    """Before, the roof was solved, and what was found was lost."""
+    monkeypatch.setitem(sys.modules, library, None)
+    for name in ("pcmc.project.solving.solve", "pcmc.cli.solving.run"):
+        monkeypatch.setattr(name, lambda *_, **__: pytest.fail("it was solved"))
+    assert cli.main(command) == 2
+    assert f"{library} is not installed; install it with: python -m pip install 'pcmc-surfaces[{extra}]'" in (
+        capsys.readouterr().err
+    )
+
+
 def test_a_mistake_of_our_own_is_not_hidden(folder, monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError

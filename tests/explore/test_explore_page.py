@@ -395,6 +395,10 @@ def test_the_diagram_of_equilibria_shows_each_of_them_by_a_click(driver):
             driver.find_elements("css selector", f".diagram polyline{of}") for of in (".saddle", "")
         )
         assert 0 < len(dashed) < len(lines)
+        marks = [text.text for text in driver.find_elements("css selector", ".diagram text")]
+        numbers = [mark for mark in marks if mark[-1].isdigit()]
+        assert len(numbers) >= 4
+        assert all(len(mark.replace(".", "").strip("-0")) <= 2 for mark in numbers)
         points = page.driver.find_elements("css selector", ".diagram circle.way")
         pressures = {float(point.get_attribute("aria-label").split()[1].strip(",")) for point in points}
         assert min(pressures) < 0.6

@@ -162,6 +162,19 @@ def test_few_families_of_panels_have_a_colour_each(driver):
         running.close()
 
 
+def test_scale_and_views_do_not_lie_over_each_other(page, driver):
+    page.find("#colours input[value=curvature]").click()
+    try:
+        for width in (800, 900, 970, 990, 1280):
+            driver.set_window_size(width, 700)
+            page.idle()
+            legend, views = (page.find(name).rect for name in ("#legend", "#views"))
+            beside = legend["x"] + legend["width"] <= views["x"]
+            assert beside or legend["y"] + legend["height"] <= views["y"], width
+    finally:
+        driver.set_window_size(1280, 860)
+
+
 @pytest.mark.nightly
 def test_the_view_turns_by_keys_mouse_and_fingers(page):
     from selenium.webdriver import ActionChains

@@ -13,7 +13,7 @@ from pcmc.forces.wall_rows import find_walls
 from pcmc.plan import Divider, Plan
 
 
-@pytest.mark.parametrize("oblique", [0.0, 1.0])
+@pytest.mark.parametrize("oblique", [*at_night(0.0), 1.0])
 @pytest.mark.parametrize(("tension", "at_mirror"), [(1.5, True), (1.2, False)])
 def test_in_a_half_it_rests_as_in_the_whole(oblique, tension, at_mirror):
     wall = Divider([[0, 4 - oblique], [6, 4 + oblique]], wall=tension)

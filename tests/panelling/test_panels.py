@@ -12,7 +12,7 @@ import pytest
 from refusals import refused
 
 import pcmc
-from generators import two_caps, two_squares
+from generators import spherical_cap, two_caps, two_squares
 from pcmc import Patch, Surface
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
@@ -112,6 +112,23 @@ def test_families_depend_neither_on_the_order_of_faces_nor_on_their_first_corner
         after = triangle_families(turned[order], tolerance, apart)
         assert np.array_equal(before.family[order], after.family)
         assert before.at_least == after.at_least
+
+
+@pytest.mark.parametrize("tolerance", [0.003, 0.1])
+def test_a_roof_that_is_turned_has_the_same_schedule(tolerance):
+    """Symmetric, so that many lengths are equal but for rounding. Before, families had other numbers, and
+    panels with two equal edges were "turned over" as it fell out."""
+    roof = pcmc.solve(spherical_cap(0.25)).surface
+    before = pcmc.panels(roof, tolerance)
+    assert not before.panels.loc[np.isclose(before.panels["a"], before.panels["b"]), "mirrored"].any()
+    rng = np.random.default_rng(0)
+    for _ in range(4):
+        turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        lengths = np.linalg.norm(edge_vectors((roof.vertices @ turn)[roof.faces]), axis=2)
+        after = triangle_families(lengths, tolerance)
+        assert np.array_equal(before.panels["family"], after.family + 1)
+        sizes = np.take_along_axis(lengths, after.order, axis=1)
+        assert before.panels[["a", "b", "c"]].to_numpy() == pytest.approx(sizes, abs=1e-9)
 
 
 def test_a_row_of_triangles_needs_as_few_families_as_intervals():

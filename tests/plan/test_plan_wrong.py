@@ -88,10 +88,20 @@ def test_wrong_plans_are_refused(changes, fields):
         plan_from({"outline": BOX, "edge_length": 1.0, **tension(changes), **changes}).surface()
 
 
-def test_a_divider_that_ends_inside_a_patch_names_the_nearest_line():
-    plan = Plan(BOX, [WALL, [[0, 6], [9, 6]]], tension=5.0)
-    with pytest.raises(PlanError, match="divider 'wall 1' is nearest, 1 away: extend the divider"):
-        plan.surface()
+@pytest.mark.parametrize(
+    ("end", "text"),
+    [
+        (9.5, "divider 'wall 1' is nearest, 0.5 away: let it end there"),
+        (10.5, "divider 'wall 1' is nearest, 0.5 away: let it end there"),
+        (5.0, "straight on, divider 'wall 1' is 5 away: extend the divider to it"),
+        (13.0, "straight on, the outline is 7 away: extend the divider to it"),  # wall 1 lies behind
+    ],
+)
+def test_a_divider_that_ends_inside_a_patch_names_the_line_to_lead_it_to(end, text):
+    """Before, it was to be extended to the line that it came from, or to one that it crosses already."""
+    with refused(PlanError, what="divider 'wall 2'", where=(end, 6.0)) as caught:
+        Plan(BOX, [WALL, [[0, 6], [end, 6]]], tension=5.0).surface()
+    assert text in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,11 @@ PLAN = "[plan]\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\n"
         ),
         (
             PLAN + "tension = 4.0\npressure = 0.0\nedge = 'cable'",
-            'the outline: edge = "cable" needs the tension of the cable, such as cable = 10.0',
+            'line 5: the outline: edge = "cable" needs the tension of the cable, such as cable = 10.0',
+        ),
+        (
+            PLAN + "tension = 4.0\n[[plan.holes]]\ncurve = [[1, 1], [2, 1], [2, 2]]\ncable = 8.0",
+            'line 6: hole 1: cable = 8.0 is of a free edge, and this one is fixed; type edge = "cable"',
         ),
     ],
 )

@@ -78,7 +78,7 @@ def test_random_forces_end_in_a_verdict_or_a_named_error(seeds):
     assert solved > 0.4 * len(seeds)
 
 
-@pytest.mark.parametrize("suffix", [".pcmc", ".fe"])
+@pytest.mark.parametrize("suffix", [".pcmc", *at_night(".fe")])
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 def test_files_carry_random_forces(suffix, tmp_path):
     carried = 0

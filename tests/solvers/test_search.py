@@ -11,7 +11,7 @@ from starts import sphere, spherical_cap, two_caps, two_squares
 
 from generators import spherical_cap_exact
 from pcmc import Cable, Verdict, certify, solve, write
-from pcmc.certificate.balance import unheld
+from pcmc.certificate.balance import strained_junction, unheld
 from pcmc.certificate.proof import Overload, UnbalancedJunction, Unheld
 from pcmc.io import native
 from pcmc.plan import Divider, Hole, Plan
@@ -142,6 +142,18 @@ def test_the_flow_of_the_paper_is_not_rescued():
         result = solve(paraboloid(5.0, 0.6), method)
         assert not result.converged
         assert result.proofs == result.tried == ()
+
+
+def test_two_sheets_of_one_tension_are_not_strained():
+    def strained(wall, west):
+        patches = {"west": {"tension": west}, "east": {"tension": 3.0}}
+        divider = Divider([[4, 0], [4, 4]], wall=wall)
+        outline = [[0, 0], [8, 0], [8, 4], [0, 4]]
+        return strained_junction(Plan(outline, [divider], edge_length=1.0, patches=patches).surface())
+
+    assert strained(None, 3.0) is None
+    assert strained(None, 4.0) is not None
+    assert strained(1.0, 4.0).remedy == ("wall 1", 1.9, True)
 
 
 def test_tensions_that_cannot_balance_are_the_proof():

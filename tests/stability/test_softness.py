@@ -22,7 +22,7 @@ def needle(height):
     return Surface(corners, faces, [0] * 4, [Patch("roof", tension)], fixed=range(4))
 
 
-@pytest.mark.parametrize("modes", [0, 1, 3])
+@pytest.mark.parametrize("modes", [0, *at_night(1), 3])
 def test_neutral_at_the_hemisphere_whatever_modes_are_asked_for(modes):
     surface = solve(spherical_cap(0.1, alpha=0.501)).surface
     branch = pcmc.follow(surface, "cap", step=-0.02, folds=1)

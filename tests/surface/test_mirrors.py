@@ -20,6 +20,7 @@ from pcmc.forces.jacobian import linearise
 from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.io import load
 from pcmc.meshing.refinement import refine
+from pcmc.plan import Plan
 from pcmc.surface import unfolded
 from pcmc.surface.geometry import area_vectors
 
@@ -346,6 +347,15 @@ def test_what_mirrored_refuses():
     ridge = Cable("ridge", 1.0, [[0, 2], [1, 4]])
     with refused(SurfaceError, what="cables", where="ridge"):
         mirrored(half_tent(cables=[ridge]))
+
+
+def test_mirrors_of_rounded_coordinates_are_told_the_angle():
+    far = [3.0, 5.196]
+    mirrors = [[[0, 0], [6, 0]], [[0, 0], far]]
+    sixth = Plan([[0, 0], [6, 0], far], mirrors=mirrors, edge_length=2.0, tension=1.6, pressure=0.4)
+    words = r"meet at 59\.9992722°, not at 180° over a whole number such as 60°; give the ends of the mirrors"
+    with pytest.raises(SurfaceError, match=words):
+        mirrored(sixth.surface())
 
 
 def test_what_mirror_planes_refuse():

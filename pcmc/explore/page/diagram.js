@@ -20,6 +20,14 @@ function range(values) {
   return [low - room, high + room];
 }
 
+/** Two to six round numbers between these, the same distance apart. */
+function ticks(low, high) {
+  const unit = 10 ** Math.floor(Math.log10((high - low) / 3));
+  const step = unit * [1, 2, 5].findLast((times) => times * unit <= (high - low) / 2.5);
+  const first = Math.ceil(low / step);
+  return Array.from({ length: Math.floor(high / step) - first + 1 }, (_, k) => (first + k) * step);
+}
+
 const kind = (index) => (index === 0 ? "stable" : `saddle, index ${index}`);
 
 /** Draw the diagram and list the equilibria; `visit(number)` shows one, or a point of a branch. */
@@ -39,13 +47,11 @@ export function showDiagram(root, { parameter, value, branches, equilibria, word
     drawn("text", { x: WIDTH - PAD, y: HEIGHT - 4, "text-anchor": "end" }, parameter),
     drawn("text", { x: 2, y: PAD + 2 }, `height${unit}`),
   );
-  for (const at of [0.1, 0.5, 0.9]) {
-    const [p, h] = [x0 + at * (x1 - x0), y0 + at * (y1 - y0)];
-    svg.append(
-      drawn("text", { x: x(p), y: HEIGHT - BOTTOM + 13, "text-anchor": "middle" }, digits(p, 3)),
-      drawn("text", { x: LEFT - 4, y: y(h) + 4, "text-anchor": "end" }, digits(h, 3)),
-    );
-  }
+  const label = (value, at) => drawn("text", { "text-anchor": "end", ...at }, digits(value));
+  svg.append(
+    ...ticks(x0, x1).map((p) => label(p, { x: x(p), y: HEIGHT - BOTTOM + 13, "text-anchor": "middle" })),
+    ...ticks(y0, y1).map((h) => label(h, { x: LEFT - 4, y: y(h) + 4 })),
+  );
   const shown = (number) => {
     for (const one of svg.querySelectorAll("circle")) one.setAttribute("aria-current", one.dataset.number === String(number));
     visit(number);

@@ -54,7 +54,7 @@ export function showFindings(body, findings, figures, units) {
   const measured = (x, kind, count) => digits(x, count) + (units.given && x !== null ? ` ${units[kind]}` : "");
   const rows = [
     ["Rise above the plane", measured(of("apex"), "length"), `The largest height above the plane Π, ${units.length}.`],
-    ["Area under pressure", measured(of("area"), "area"), `Of all patches except walls, ${units.area}.`],
+    ["Area of the roof", measured(of("area"), "area"), `Of all patches except walls, ${units.area}.`],
     ["Volume", measured(findings.volume, "volume"), `Between the patches with pressure and the plane Π, ${units.volume}.`],
     ["Energy", measured(findings.energy, "energy", 6), `Σ α A − Σ p V, ${units.energy}. A surface at rest has no nearby shape of other first-order energy; a stable one has the least.`],
     ["Morse index", findings.index ?? "–", "How many independent changes of shape lower the energy. 0: stable, every small push is resisted. 1 or more: a saddle, which a small push moves away from."],

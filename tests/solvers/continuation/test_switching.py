@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from convergence import orders
+from nightly import at_night
 from refusals import refused
 from scipy.spatial import cKDTree
 from shapes import pyramid
@@ -106,7 +107,7 @@ def test_energy_changes_with_the_boundary_as_the_reactions_say():
     assert slope[-1] == pytest.approx(exact, rel=0.01)
 
 
-@pytest.mark.parametrize("name", ["energy", "volume", "height"])
+@pytest.mark.parametrize("name", [*at_night("energy"), "volume", *at_night("height")])
 def test_goals_are_met_while_the_boundary_moves(name):
     start = solve(enneper(0.3)).surface
     motion = BoundaryMotion(wire(start), 0.8)
