@@ -244,20 +244,25 @@ class _Search:
         if branch is None:
             self.failed.append(f"No branch in {line.name} starts at the equilibrium {how}.")
             return
-        level, how = [branch], f"on a branch in {line.name}"
+        level, how, led_to = [branch], f"on a branch in {line.name}", {number}
         for depth in range(self.options.depth + 1):
             following = list[Branch]()
             for branch in level:
                 self.branches[line.name].append(branch)
                 for there, beside in line.crossings(branch):
-                    self.cross(line, there, beside, how)
+                    self.cross(line, there, beside, how, led_to)
                 if depth < self.options.depth:
                     following += self.leaving(line, branch, watch)
             level, how = following, f"on a branch in {line.name}, beyond a bifurcation"
 
-    def cross(self, line: TracedParameter, there: Surface | str, beside: str, how: str) -> None:
-        """Add the equilibrium where a branch passes the present value, or tell why there is none."""
-        now, known = f"{line.name} {line.value:.4g}", len(self.found)
+    def cross(
+        self, line: TracedParameter, there: Surface | str, beside: str, how: str, led_to: set[int]
+    ) -> None:
+        """Add the equilibrium where a branch passes the present value, or tell why there is none.
+
+        ``led_to`` are those that the branches it comes from have led to.
+        """
+        now = f"{line.name} {line.value:.4g}"
         if isinstance(there, str):
             self.failed.append(f"A branch passes {now}, but its equilibrium there was not reached: {there}.")
             return
@@ -266,9 +271,10 @@ class _Search:
             self.failed.append(f"A branch passes {now}, but its equilibrium there cannot be certified.")
             return
         self.on_branch.add(k)
-        if beside and k < known:
+        if beside and k in led_to:
             back = f"the way from there to {line.value:.4g} leads back to a known equilibrium"
             self.failed.append(f"A branch left at {line.name} {beside}; {back}. Try a finer mesh.")
+        led_to.add(k)
 
     def leaving(
         self, line: TracedParameter, branch: Branch, watch: Callable[[Progress], None]
@@ -302,7 +308,7 @@ class _Search:
                 ends.append(end)
                 if one.index == 1:
                     self.ways.append(WayDown(number, to, end))
-        if one.index > 1 and any(ends):
+        if any(ends) and (one.index > 1 or all(ends)):  # a barrier tells of the others
             lost = ", ".join(f"{end} ({ends.count(end)})" for end in sorted({*ends} - {""}))
             self.failed.append(f"The {len(ends)} ways down from a saddle of index {one.index}: {lost}.")
 

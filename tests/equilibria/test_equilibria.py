@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from refusals import refused
+from volume_cases import connected_caps
 
 from generators import (
     catenoid,
@@ -117,6 +118,20 @@ def test_the_wide_catenoid_breaks_over_the_deep_one():
         errors.append(abs(found.barrier(1) - (deep.energy - wide.energy)))
     assert np.log2(errors[0] / errors[1]) > 1.8
     assert errors[1] < 0.02 * (deep.energy - wide.energy)
+
+
+def test_two_caps_under_one_gas_are_a_double_well():
+    """V = πh(3 + h²)/6 and A = π(1 + h²): the pass has equal heights, minima have h and 1/h, of equal radii."""
+    h = np.array([1.25, 1.25, 1.642024, 1.0 / 1.642024])
+    volumes, areas = np.pi * h * (3.0 + h**2) / 6.0, np.pi * (1.0 + h**2)
+    assert volumes[:2].sum() == pytest.approx(volumes[2:].sum(), rel=1e-6)
+    pair = solve(connected_caps(volumes[:2].sum()), target="stationary")
+    found = find_equilibria(pair, Direction(volumes={"both": 1.0}), starts=0)
+    assert [one.index for one in found.found] == [0, 0, 1]
+    for one, other in ((1, 2), (2, 1)):
+        exact = areas[:2].sum() - areas[2:].sum()
+        assert found.barrier(one, other) == pytest.approx(exact, rel=0.1)
+    assert not found.failed  # both branches reach their minimum, also where a start has found it before
 
 
 def test_without_mmgpy_the_deep_catenoid_keeps_its_triangles(monkeypatch):
@@ -382,6 +397,10 @@ def test_numbers_of_equilibria_are_checked(caps):
         caps[0].barrier(2)
     with refused(OptionError, what="to"):
         caps[0].barrier(1, 2)
+    with refused(OptionError, what="start", found="1"):
+        caps[0].barrier("1")
+    with refused(OptionError, what="to", found="1"):
+        caps[0].barrier(1, "1")
     assert caps[0].barrier(1, 1) == 0.0
 
 
@@ -413,6 +432,17 @@ def test_minima_that_no_saddle_joins_are_named():
         "barrier from 1 to 2, 3: not known, as no saddle was found between them",
         "barrier from 1 to 4: not known, as no saddle was found between them",
     ]
+
+
+def test_a_saddle_from_which_no_way_leads_to_a_minimum_is_named():
+    """A roof of two tops, of which either runs away, farther than its triangles can follow."""
+    X = [[-3, -1, 0], [0, -1, 0], [3, -1, 0], [3, 1, 0], [0, 1, 0], [-3, 1, 0], [-1, 0, 1], [1, 0, 1]]
+    F = [[0, 1, 6], [1, 7, 6], [1, 2, 7], [2, 3, 7], [3, 4, 7], [4, 6, 7], [4, 5, 6], [5, 0, 6]]
+    roof = Surface(X, F, [0] * 8, [Patch("roof", 0.39)], fixed=range(6))
+    found = find_equilibria(roof, (), starts=0)
+    assert [one.index for one in found.found] == [1]
+    assert not found.barriers
+    assert "The 2 ways down from a saddle of index 1: pinches off or collapses (2)." in str(found)
 
 
 def test_a_search_that_is_stopped_keeps_what_it_has():
