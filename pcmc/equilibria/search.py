@@ -28,6 +28,7 @@ from .shapes import Shape
 
 MODES = 8  # of the lowest modes a start is displaced along
 FAR = (0.05, 0.3)  # of the size: how far a start is displaced
+SAME_VALUE = 1e-4  # of the span: bifurcations of one shape nearer to each other than this are one
 ENDS = {
     Status.DIVERGED: "inflates without bound",
     Status.VANISHED: "shrinks to nothing",
@@ -164,7 +165,7 @@ class _Search:
         self.on_branch: set[int] = set()  # those that a branch has led to
         self.ways: list[WayDown] = []
         self.branches: dict[str, list[Branch]] = {line.name: [] for line in lines}
-        self.left: dict[str, list[Shape]] = {line.name: [] for line in lines}  # by ways at bifurcations
+        self.left: dict[str, list[tuple[float, Shape]]] = {line.name: [] for line in lines}  # at bifurcations
         self.tried: set[tuple[int, int]] = set()  # pairs of minima
         self.failed: list[str] = []
         self.starts = self.arrived = 0
@@ -272,12 +273,12 @@ class _Search:
     def leaving(
         self, line: TracedParameter, branch: Branch, watch: Callable[[Progress], None]
     ) -> list[Branch]:
-        """The branches that leave one at bifurcations where no other was left before."""
-        found = list[Branch]()
+        """The branches that leave one at bifurcations that none has been left at before."""
+        found, near = list[Branch](), SAME_VALUE * (line.span[1] - line.span[0])
         for row, value in line.bifurcations(branch):
-            shape = Shape.of(branch.event_surfaces[row])
-            if not any(shape.same_as(other) for other in self.left[line.name]):
-                self.left[line.name].append(shape)
+            shape, known = Shape.of(branch.event_surfaces[row]), self.left[line.name]
+            if not any(abs(value - at) <= near and shape.same_as(other) for at, other in known):
+                known.append((value, shape))
                 try:
                     found += line.leaving(branch, row, watch)
                 except OptionError as error:

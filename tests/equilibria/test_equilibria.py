@@ -22,7 +22,7 @@ from generators import (
     two_squares,
 )
 from generators.grid import grid_faces
-from pcmc import BoundaryMotion, Direction, Patch, Plane, Room, Surface, find_equilibria, solve
+from pcmc import BoundaryMotion, Direction, Patch, Plane, Room, Surface, find_equilibria, follow, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.equilibria import branches, shape_distance
 from pcmc.equilibria.found import Equilibria, WayDown
@@ -71,6 +71,29 @@ def test_deflation_alone_finds_the_large_cap():
     assert [one.index for one in found.found] == [0, 1]
     assert found[2].found == "by deflation"
     assert not found.branches
+
+
+def test_beside_a_fold_the_cap_behind_it_is_found_though_one_step_leads_past_both():
+    start, along = spherical_cap(0.3), Direction({"cap": 1.0})
+    (fold,) = follow(solve(start).surface, along, step=-0.05, folds=1).folds.itertuples()
+    found = find_equilibria(start.retensioned({"cap": 1.001 * fold.parameter}), along, starts=0)
+    assert [one.index for one in found.found] == [0, 1]
+    assert 0.0 < found.barrier(1) < 1e-3 * found[1].energy
+    assert found[1].height < fold.height < found[2].height
+    assert not found.failed
+
+
+def test_what_is_found_does_not_depend_on_the_unit_of_force():
+    one, small = (
+        find_equilibria(
+            replace(spherical_cap(0.5), patches=[Patch("cap", 0.6 * unit, unit)]),
+            Direction({"cap": 1.0}),
+            starts=0,
+        )
+        for unit in (1.0, 1e-6)
+    )
+    assert [at.index for at in small.found] == [at.index for at in one.found] == [0, 1]
+    assert 1e6 * small.barrier(1) == pytest.approx(one.barrier(1), rel=1e-6)
 
 
 def catenoids(edge):
@@ -149,6 +172,30 @@ def test_two_unduloids_leave_a_tube_of_prescribed_volume():
     assert 4.0 * found.barrier(1) == pytest.approx(18.862749 - 6.0 * np.pi, rel=0.1)
     critical = found.branches["volume"][0].bifurcations.parameter
     assert critical.tolist() == pytest.approx([(length / np.pi) ** 2], rel=0.01)
+
+
+def test_each_of_two_bifurcations_of_nearly_one_shape_is_followed():
+    """Quarters of two tubes that do not touch, one a little longer: each is left by two unduloids."""
+    lengths, number = (3.0, 3.05), np.arange(9 * 5).reshape(9, 5)
+    rows, planes = list[np.ndarray](), {}
+    for first, bottom, length in ((0, 0.0, lengths[0]), (45, 10.0, lengths[1])):
+        around, along = np.linspace(0.0, np.pi / 2, 5), np.linspace(bottom, bottom + length, 9)
+        around, along = np.meshgrid(around, along)
+        rows.append(np.stack([np.cos(around), np.sin(around), along], axis=-1).reshape(-1, 3).round(15))
+        for side, on in (((1, 0, 0), number[:, -1]), ((0, 1, 0), number[:, 0])):
+            planes.setdefault(Plane((0, 0, 0), side, mirror=True), []).extend(first + on)
+        for on in (number[0], number[-1]):
+            planes[Plane((0, 0, rows[-1][on[0], 2]), (0, 0, 1))] = first + on
+    faces = grid_faces(8, 4)[:, ::-1]
+    rooms = [Room(f"in {k}", {f"tube {k}": 1}, np.pi * length / 4.0) for k, length in enumerate(lengths)]
+    patches, patch = [Patch(f"tube {k}", 1.0) for k in (0, 1)], np.repeat([0, 1], len(faces))
+    tubes = Surface(np.vstack(rows), [*faces, *(faces + 45)], patch, patches, on_planes=planes, rooms=rooms)
+    found = find_equilibria(solve(tubes, target="stationary"), "volume", starts=0, depth=1)
+    first, *others = found.branches["volume"]
+    critical = first.bifurcations.parameter
+    assert critical.tolist() == pytest.approx([(length / np.pi) ** 2 for length in lengths], rel=0.02)
+    assert sorted(other.points.parameter[0] for other in others) == sorted([*critical, *critical])
+    assert [one.index for one in found.found] == [0, 1, 1, 1, 1]
 
 
 def test_a_crossing_without_an_equilibrium_is_named(monkeypatch):
