@@ -20,7 +20,7 @@ from pcmc import cli
 from pcmc.base.errors import FileError, LostWarning, MissingExtra, OptionError
 from pcmc.base.units import FORCES, LENGTHS, Units, length_factor
 from pcmc.forces.functional import patch_areas
-from pcmc.io.georeference import Georeference
+from pcmc.io import Georeference
 from pcmc.plan import Plan, polyline
 from pcmc.structure import StructuralModel, drawn_members
 from pcmc.structure.columns import columns_at_rest
