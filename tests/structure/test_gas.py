@@ -45,7 +45,7 @@ def test_enclosed_gas_gives_way_as_the_volume_does():
 
 
 def test_a_cap_past_its_fold_is_held_by_the_gas():
-    """V(h) = π h (3 + h²) / 6 and p(h) = 4 α h / (1 + h²): a saddle, as dp/dV < 0; but the gas's p falls faster.
+    """V = π h (3 + h²) / 6 and p = 4 α h / (1 + h²): a saddle, as dp/dV < 0; but the gas's p falls faster.
 
     With the gas A is A + κ g gᵀ, κ = (p_a + p) / V, of index 0 where 1 + κ gᵀ A⁻¹ g < 0.
     """
