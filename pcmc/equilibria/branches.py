@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ FROM_ZERO = 4.0  # the same, of what is 0 now, in the unit of ``margin``
 STEPS = 80  # of a branch in each direction
 FIRST = 0.05  # step of a branch
 LARGEST = (0.15, 0.03, 0.006)  # steps at most; the next where one is too long
+PLACE = ["arclength", "parameter"]  # of points and events
 SWITCHED = 1e-6  # of the span: nearer to its present value, a switched branch has not left it
 
 
@@ -114,13 +116,16 @@ class TracedParameter:
         The place is "" except beside a bifurcation: the first point of a branch may be far from that, and the
         way back may lead onto the branch that was left.
         """
-        values, slopes = branch.points.parameter.to_numpy(), branch.points.slope.to_numpy()
-        off = values - self.value
-        for i in np.flatnonzero((off[:-1] * off[1:] < 0.0) & (np.abs(off[:-1] - off[1:]) > SWITCHED)):
-            beside = [int(k) for k in (i, i + 1) if slopes[k] != 0.0]  # a bifurcation is singular
-            there = self._reached(branch, sorted(beside, key=lambda k: abs(off[k])))
-            place = "" if len(beside) == 2 else f"{values[i]:.4g} and was first met at {values[i + 1]:.4g}"
-            yield there, place
+        every = np.concatenate([branch.points[PLACE], branch.folds[PLACE]])  # a step may turn on its way
+        off, least = every[:, 1] - self.value, SWITCHED * (self.span[1] - self.span[0])
+        slopes, last = branch.points.slope.to_numpy(), len(branch.points)
+        for i, j in pairwise(np.argsort(every[:, 0], kind="stable").tolist()):
+            if off[i] * off[j] < 0.0 and abs(off[i] - off[j]) > least:
+                rows = [k for k in (i, j) if k < last]
+                regular = [k for k in rows if slopes[k] != 0.0]  # a bifurcation is singular
+                there = self._reached(branch, sorted(regular, key=lambda k: abs(off[k])))
+                beside = f"{every[i, 1]:.4g} and was first met at {every[j, 1]:.4g}"
+                yield there, beside if regular != rows else ""
 
     def _reached(self, branch: Branch, rows: Sequence[int]) -> Surface | str:
         """The surface at the present value, from the first of some points that leads there; or why none."""

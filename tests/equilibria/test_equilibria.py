@@ -22,7 +22,7 @@ from generators import (
     two_squares,
 )
 from generators.grid import grid_faces
-from pcmc import BoundaryMotion, Direction, Patch, Plane, Room, Surface, find_equilibria, solve
+from pcmc import BoundaryMotion, Direction, Patch, Plane, Room, Surface, find_equilibria, follow, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.equilibria import branches, shape_distance
 from pcmc.equilibria.found import Equilibria, WayDown
@@ -71,6 +71,29 @@ def test_deflation_alone_finds_the_large_cap():
     assert [one.index for one in found.found] == [0, 1]
     assert found[2].found == "by deflation"
     assert not found.branches
+
+
+def test_beside_a_fold_the_cap_behind_it_is_found_though_one_step_leads_past_both():
+    start, along = spherical_cap(0.3), Direction({"cap": 1.0})
+    (fold,) = follow(solve(start).surface, along, step=-0.05, folds=1).folds.itertuples()
+    found = find_equilibria(start.retensioned({"cap": 1.001 * fold.parameter}), along, starts=0)
+    assert [one.index for one in found.found] == [0, 1]
+    assert 0.0 < found.barrier(1) < 1e-3 * found[1].energy
+    assert found[1].height < fold.height < found[2].height
+    assert not found.failed
+
+
+def test_what_is_found_does_not_depend_on_the_unit_of_force():
+    one, small = (
+        find_equilibria(
+            replace(spherical_cap(0.5), patches=[Patch("cap", 0.6 * unit, unit)]),
+            Direction({"cap": 1.0}),
+            starts=0,
+        )
+        for unit in (1.0, 1e-6)
+    )
+    assert [at.index for at in small.found] == [at.index for at in one.found] == [0, 1]
+    assert 1e6 * small.barrier(1) == pytest.approx(one.barrier(1), rel=1e-6)
 
 
 def catenoids(edge):
