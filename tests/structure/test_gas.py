@@ -20,6 +20,7 @@ from pcmc.forces.rooms import room_volume_gradients
 from pcmc.plan import Plan
 from pcmc.stability.equilibrium import Equilibrium
 from pcmc.structure import Gas, analyse, calculix
+from pcmc.structure.section import Structure
 from pcmc.surface.values import in_the_open
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
@@ -199,3 +200,12 @@ def test_a_gas_has_the_pressure_of_the_air_outside_in_any_units():
         model_of(uneven, gas=Gas(ambient=100.0), anyway=True)
     with refused(OptionError, what="Gas.volume"):  # it is flat
         model_of(parts(), gas=Gas(ambient=100.0), anyway=True)
+
+
+def test_gas_of_two_pressures_is_refused_before_the_work():
+    """Before, the roof was solved first."""
+    bays = {"west": {"tension": 6.0}, "east": {"tension": 5.0, "pressure": 0.9}}
+    plan = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [[[4, 0], [4, 4]]], edge_length=2.0, patches=bays)
+    with refused(OptionError, what="Gas.patches") as caught:
+        Structure(young=1e6, thickness=1e-3, gas=True).check(plan.surface(), plan)
+    assert "it has one pressure, but 'east' has 0.9 and 'west' 1" in str(caught.value)
