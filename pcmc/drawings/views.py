@@ -117,7 +117,7 @@ def plan_view(surface: Surface, curves: Lines, points: Sequence[tuple[Floats, st
     middle = 0.5 * np.sum(view.box, axis=0)
     for curve in curves:
         if curve.layer in ("PCMC-CABLE", MEMBERS):
-            at = curve.points[len(curve.points) // 2, :2]
+            at = curve.points[[(len(curve.points) - 1) // 2, len(curve.points) // 2], :2].mean(axis=0)
             away = at - middle
             view.texts.append((at, curve.name, away / (np.linalg.norm(away) or 1.0)))
     view.stations = outline_places(curves, (1.0, 0.0, 0.0)), outline_places(curves, (0.0, 1.0, 0.0))

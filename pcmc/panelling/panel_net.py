@@ -33,7 +33,7 @@ LARGEST = 0.5  # of a sheet's size: larger panels are refused
 MOST = 100_000  # panels of a sheet; more mean a mistake in the unit
 KINDS = np.array(["inside", "edge", "corner"])  # of nodes
 WARPED = 0.02  # planarity from which sheets of glass or metal are no longer bent into place
-FAR = 0.25  # of the size: a warning names nodes that planarity moves farther from the surface
+FAR = 0.25  # of the size: a warning names nodes and panels that are farther from the surface
 NO_AREA = 1e-3  # of the size squared: a warning names smaller panels
 
 
@@ -154,9 +154,14 @@ class PanelNet:
         if len(self.umbilics):
             places = ", ".join(point_text(place.round(2)) for place in self.umbilics[:6])
             rows["umbilics"] = f"{len(self.umbilics)}: {places}"
+        widest = table.iloc[table["distance"].argmax()]
         if far > FAR * self.size:
             text = f"nodes are up to {100.0 * far / self.size:.0f} % of the size from the surface: choose a"
             rows["far off"] = f"{text} smaller size, or pattern 'quads'"
+        elif widest["distance"] > FAR * self.size:
+            text = f"panel {widest['panel']} ({widest['kind']}), with an area of {widest['area']:.3g}, is"
+            text += f" {100.0 * widest['distance'] / self.size:.0f} % of the size from the surface: choose"
+            rows["far off"] = f"{text} a smaller size, or pattern 'quads'"
         if flat := table["panel"][area < NO_AREA * self.size**2].tolist():
             text = f"{len(flat)} panels have next to no area, as panel {flat[0]}: choose another size"
             rows["slivers"] = text

@@ -297,6 +297,8 @@ class Structure:
         check_loads(self.loads_on(surface), surface, [line.wall for line in lines])
         bars_on(surface, members, lines)
         checked_areas(self.cable_area, surface, [str(member.on) for member in members])
+        if self.enclosed is not None:
+            self.enclosed.signs(surface)
 
     def model(self, surface: Any, plan: Plan | None = None, **about: Any) -> StructuralModel:
         """The structural model of a surface at rest or of a result, with the members that its ``plan`` names;

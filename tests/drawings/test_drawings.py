@@ -13,7 +13,8 @@ from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.cli import main
 from pcmc.drawings import drawing_set, dxf
-from pcmc.drawings.sheet import box, column
+from pcmc.drawings.sheet import MEMBERS, SheetLine, box, column
+from pcmc.drawings.views import model_curves, plan_view
 from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import Plan
 from pcmc.surface import mirrored
@@ -188,3 +189,10 @@ def test_the_command_refuses_bad_input_in_one_line(tmp_path, squares, capsys, op
     assert main(["draw", str(roof), "-o", str(tmp_path / "roof.dxf"), *words]) == 2
     assert capsys.readouterr().err.strip().count("\n") == 0
     assert [path.name for path in tmp_path.iterdir()] == ["roof.pcmc"]
+
+
+def test_the_name_of_a_line_stands_at_its_middle():
+    roof = spherical_cap(0.3)
+    stay = SheetLine(np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]]), MEMBERS, name="stay")
+    view = plan_view(roof, [*model_curves(roof), stay], [])
+    assert [(at.tolist(), name) for at, name, _ in view.texts] == [([2.0, 0.0], "stay")]

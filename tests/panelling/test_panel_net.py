@@ -163,6 +163,21 @@ def test_a_net_that_leaves_the_roof_says_so(rectangle):
     assert "far off" not in str(panel_net(rectangle, 0.9))
 
 
+def test_a_wide_panel_over_an_umbilic_is_named():
+    far = [3.0, 27.0**0.5]
+    mirrors = [[[0, 0], [6, 0]], [[0, 0], far]]
+    sixth = Plan([[0, 0], [6, 0], far], mirrors=mirrors, edge_length=0.4, tension=4.0).surface()
+    net = panel_net(pcmc.mirrored(pcmc.solve(sixth).surface), 0.9)
+    widest = net.panels.loc[net.panels["distance"].idxmax()]
+    assert widest["kind"] == "umbilic"
+    assert widest["area"] > 20.0 * 0.9**2
+    share = 100.0 * widest["distance"] / 0.9
+    assert (
+        f"panel {widest['panel']} (umbilic), with an area of {widest['area']:.3g}, is {share:.0f} %"
+        in str(net)
+    )
+
+
 def test_panels_without_area_are_told_of(rectangle):
     net = panel_net(rectangle, 1.0, "quads")
     thin = net.panels.assign(area=net.panels["area"].where(net.panels["panel"] != 7, 1e-4))

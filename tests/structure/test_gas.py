@@ -6,16 +6,21 @@ import numpy as np
 import pytest
 from nightly import at_night
 from refusals import refused
+from scipy.linalg import eigh
 from scipy.optimize import brentq
+from starts import spherical_cap
 from structures import model_of
 from under_load import ALPHA, THICK, cap, parts, stiffness, strip
 
 import pcmc
-from pcmc import Material, Patch, SelfWeight, Snow, Surface, Wind
-from pcmc.base.errors import OptionError
+from pcmc import Material, Patch, Room, SelfWeight, Snow, Surface, Wind
+from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
+from pcmc.forces.rooms import room_volume_gradients
 from pcmc.plan import Plan
+from pcmc.stability.equilibrium import Equilibrium
 from pcmc.structure import Gas, analyse, calculix
+from pcmc.structure.section import Structure
 from pcmc.surface.values import in_the_open
 
 needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
@@ -38,6 +43,34 @@ def test_enclosed_gas_gives_way_as_the_volume_does():
     )
     same = analyse(held)["wind"].results.deflections
     np.testing.assert_allclose(case.results.deflections, same, atol=1e-5 * same.max())
+
+
+def test_a_cap_past_its_fold_is_held_by_the_gas():
+    """V = π h (3 + h²) / 6 and p = 4 α h / (1 + h²): a saddle, as dp/dV < 0; but the gas's p falls faster.
+
+    With the gas A is A + κ g gᵀ, κ = (p_a + p) / V, of index 0 where 1 + κ gᵀ A⁻¹ g < 0.
+    """
+    h = 2.0 * ALPHA + np.sqrt(4.0 * ALPHA**2 - 1.0)
+    volume, slope = np.pi * h * (3.0 + h * h) / 6.0, np.pi * (1.0 + h * h) / 2.0
+    exact = slope * (1.0 + h * h) ** 2 / (4.0 * ALPHA * (1.0 - h * h))  # dV/dp
+    given = spherical_cap(0.15, alpha=ALPHA)
+    large = pcmc.solve(given.rebuilt(rooms=[Room("dome", {"cap": 1}, volume)])).surface
+    pressed = large.rebuilt(rooms=[])
+    at = Equilibrium.of(pressed)
+    second, g = at.factorised(), at.space.to_coordinates(room_volume_gradients(large, large.vertices)[0])
+    assert second.negative == 1
+    change = g @ second.solve(g)
+    assert change == pytest.approx(exact, rel=0.01)
+    kappa = Gas(ambient=0.0).pressure(pressed) / volume
+    assert 1.0 + kappa * change < 0.0
+    matrix, mass = second.matrix.toarray(), np.diag(at.mass)
+    lowest = eigh(matrix + kappa * np.outer(g, g), mass, eigvals_only=True)[0]
+    held = pcmc.certify(large)
+    assert held.index == 0
+    assert lowest == pytest.approx(held.eigenvalues[0], rel=0.01)  # it sways; the breathing mode is stiffer
+    with refused(SurfaceError, found=pcmc.Verdict.SADDLE):
+        model_of(pressed, gas=Gas(ambient=0.0))
+    assert model_of(large, gas=Gas(ambient=0.0)).certificate.certified
 
 
 def sphere_area():
@@ -167,3 +200,12 @@ def test_a_gas_has_the_pressure_of_the_air_outside_in_any_units():
         model_of(uneven, gas=Gas(ambient=100.0), anyway=True)
     with refused(OptionError, what="Gas.volume"):  # it is flat
         model_of(parts(), gas=Gas(ambient=100.0), anyway=True)
+
+
+def test_gas_of_two_pressures_is_refused_before_the_work():
+    """Before, the roof was solved first."""
+    bays = {"west": {"tension": 6.0}, "east": {"tension": 5.0, "pressure": 0.9}}
+    plan = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], [[[4, 0], [4, 4]]], edge_length=2.0, patches=bays)
+    with refused(OptionError, what="Gas.patches") as caught:
+        Structure(young=1e6, thickness=1e-3, gas=True).check(plan.surface(), plan)
+    assert "it has one pressure, but 'east' has 0.9 and 'west' 1" in str(caught.value)
