@@ -121,7 +121,7 @@ def test_the_wide_catenoid_breaks_over_the_deep_one():
 
 
 def test_two_caps_under_one_gas_are_a_double_well():
-    """V = πh(3 + h²)/6 and A = π(1 + h²): the pass has equal heights, minima have h and 1/h, of equal radii."""
+    """V = πh(3 + h²)/6, A = π(1 + h²): the pass has equal heights, minima have h and 1/h, of equal radii."""
     h = np.array([1.25, 1.25, 1.642024, 1.0 / 1.642024])
     volumes, areas = np.pi * h * (3.0 + h**2) / 6.0, np.pi * (1.0 + h**2)
     assert volumes[:2].sum() == pytest.approx(volumes[2:].sum(), rel=1e-6)
