@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -21,7 +21,7 @@ from ..solvers.result import Progress, Result, Status
 from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
-from .branches import Span, TracedParameter
+from .branches import Span, TracedParameter, join_branches
 from .found import Equilibria, FoundEquilibrium, WayDown
 from .from_known import deflated_newton, pass_between, way_down, with_good_triangles
 from .shapes import Shape
@@ -240,11 +240,12 @@ class _Search:
             text = f"The equilibrium {how} has a new mesh; no branch in {line.name} was followed from it"
             self.failed.append(f"{text}, as that moves the vertices of the boundary.")
             return
-        branch = line.trace(start, watch)
-        if branch is None:
+        halves = line.halves(start, watch)
+        if halves is None:
             self.failed.append(f"No branch in {line.name} starts at the equilibrium {how}.")
             return
-        level, how, led_to = [branch], f"on a branch in {line.name}", {number}
+        self.tell_early_ends(line, halves)
+        level, how, led_to = [join_branches(*halves)], f"on a branch in {line.name}", {number}
         for depth in range(self.options.depth + 1):
             following = list[Branch]()
             for branch in level:
@@ -253,7 +254,12 @@ class _Search:
                     self.cross(line, there, beside, how, led_to)
                 if depth < self.options.depth:
                     following += self.leaving(line, branch, watch)
+            self.tell_early_ends(line, following)
             level, how = following, f"on a branch in {line.name}, beyond a bifurcation"
+
+    def tell_early_ends(self, line: TracedParameter, branches: Iterable[Branch]) -> None:
+        for end in filter(None, map(line.early_end, branches)):
+            self.failed.append(f"A branch {end}; what lies beyond on it is not known. Try a finer mesh.")
 
     def cross(
         self, line: TracedParameter, there: Surface | str, beside: str, how: str, led_to: set[int]

@@ -23,7 +23,7 @@ from generators import (
     two_squares,
 )
 from generators.grid import grid_faces
-from pcmc import BoundaryMotion, Direction, Patch, Plane, Room, Surface, find_equilibria, follow, solve
+from pcmc import BoundaryMotion, Cable, Direction, Patch, Plane, Room, Surface, find_equilibria, follow, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.equilibria import branches, shape_distance
 from pcmc.equilibria.found import Equilibria, WayDown
@@ -234,6 +234,21 @@ def test_a_crossing_without_an_equilibrium_is_named(monkeypatch):
     monkeypatch.setattr(Branch, "resume", higher)
     found = find_equilibria(spherical_cap(0.5), starts=0)
     assert "A branch passes pressure 1, but its equilibrium there cannot be certified." in str(found)
+
+
+def test_a_branch_that_ends_within_the_span_is_named(monkeypatch):
+    """Of an edge cable of chord 2 on a film of tension 1 the arcs end at the half circle, of tension 1."""
+    X = np.array([[x, y, 0.0] for x in np.linspace(-1.0, 1.0, 9) for y in np.linspace(0.0, 3.0, 13)])
+    rim, edge = (np.abs(X[:, 0]) == 1.0) | (X[:, 1] == 3.0), Cable.along("edge", 1.5, np.arange(0, 117, 13))
+    film = Surface(X, grid_faces(8, 12), [0] * 192, [Patch("film", 1.0, 0.0)], fixed=rim, cables=[edge])
+    (line,) = find_equilibria(film, Direction(cables={"edge": 1.0}), starts=0).failed
+    assert line.startswith("A branch ended at parameter 1.0")
+    assert "as triangles collapse; what lies beyond on it is not known" in line
+    monkeypatch.setattr(branches, "STEPS", 2)
+    one, other = find_equilibria(spherical_cap(0.5), starts=0).failed
+    assert "A branch ended at pressure 0.8" in one
+    assert "after 2 steps" in one
+    assert "after 2 steps" in other
 
 
 @pytest.mark.nightly
