@@ -56,12 +56,20 @@ class TracedParameter:
             validate.refuse("span", (low, high), f"numbers below and above the present value {value:g}")
         return cls(name, parameter, value, (low, high))
 
-    def trace(self, surface: Surface, watch: Callable[[Progress], None]) -> Branch | None:
-        """The branch through a surface, both ways to the ends of the span; None if none starts there."""
+    def halves(self, surface: Surface, watch: Callable[[Progress], None]) -> tuple[Branch, Branch] | str:
+        """The branch through a surface, each way to the end of the span; or why none starts there."""
         try:
-            return join_branches(*(self._half(surface, sign, watch) for sign in (-1.0, 1.0)))
-        except NoBranch:
-            return None
+            return self._half(surface, -1.0, watch), self._half(surface, 1.0, watch)
+        except NoBranch as error:
+            return str(error)
+
+    def early_end(self, branch: Branch) -> str:
+        """Where and why a branch ends within the span; "" if it leads out of it."""
+        value = float(branch.points.parameter.iloc[-1])
+        if not self.span[0] <= value <= self.span[1]:
+            return ""
+        why = {Ending.STEPS: f"after {STEPS} steps", Ending.LOST: f"as {branch.detail}"}
+        return f"ended at {self.name} {value:.4g} {why.get(branch.ending, 'as triangles collapse')}"
 
     def _half(self, surface: Surface, sign: float, watch: Callable[[Progress], None]) -> Branch:
         """One way; again in short steps where contact and index change on one, which hides a bifurcation."""

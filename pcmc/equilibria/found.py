@@ -152,11 +152,11 @@ class Equilibria:
         Over all chains of minima and saddles from ``start`` to ``to`` the least of their highest saddles,
         less the energy of the start; inf if no chain found leads there.
         """
-        validate.choice("start", str(start), [str(k) for k in self.stable])
+        validate.choice("start", str(validate.integer("start", start)), [str(k) for k in self.stable])
         if to is None:
             ways = (b.energy for b in self.barriers if b.start == start and b.to != start)
             return min(ways, default=math.inf)
-        validate.choice("to", str(to), [str(k) for k in self.stable])
+        validate.choice("to", str(validate.integer("to", to)), [str(k) for k in self.stable])
         reached, top = set[int | None]({start}), -math.inf
         while to not in reached:
             steps = [(self[b.saddle].energy, b.to) for b in self.barriers if b.start in reached and b.to]

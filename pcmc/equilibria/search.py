@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -21,7 +21,7 @@ from ..solvers.result import Progress, Result, Status
 from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
-from .branches import Span, TracedParameter
+from .branches import Span, TracedParameter, join_branches
 from .found import Equilibria, FoundEquilibrium, WayDown
 from .from_known import deflated_newton, pass_between, way_down, with_good_triangles
 from .shapes import Shape
@@ -240,24 +240,35 @@ class _Search:
             text = f"The equilibrium {how} has a new mesh; no branch in {line.name} was followed from it"
             self.failed.append(f"{text}, as that moves the vertices of the boundary.")
             return
-        branch = line.trace(start, watch)
-        if branch is None:
-            self.failed.append(f"No branch in {line.name} starts at the equilibrium {how}.")
+        halves = line.halves(start, watch)
+        if isinstance(halves, str):
+            self.failed.append(f"No branch in {line.name} starts at the equilibrium {how}: {halves}.")
             return
-        level, how = [branch], f"on a branch in {line.name}"
+        self.tell_early_ends(line, halves)
+        level, how, led_to = [join_branches(*halves)], f"on a branch in {line.name}", {number}
         for depth in range(self.options.depth + 1):
             following = list[Branch]()
             for branch in level:
                 self.branches[line.name].append(branch)
                 for there, beside in line.crossings(branch):
-                    self.cross(line, there, beside, how)
+                    self.cross(line, there, beside, how, led_to)
                 if depth < self.options.depth:
                     following += self.leaving(line, branch, watch)
+            self.tell_early_ends(line, following)
             level, how = following, f"on a branch in {line.name}, beyond a bifurcation"
 
-    def cross(self, line: TracedParameter, there: Surface | str, beside: str, how: str) -> None:
-        """Add the equilibrium where a branch passes the present value, or tell why there is none."""
-        now, known = f"{line.name} {line.value:.4g}", len(self.found)
+    def tell_early_ends(self, line: TracedParameter, branches: Iterable[Branch]) -> None:
+        for end in filter(None, map(line.early_end, branches)):
+            self.failed.append(f"A branch {end}; what lies beyond on it is not known. Try a finer mesh.")
+
+    def cross(
+        self, line: TracedParameter, there: Surface | str, beside: str, how: str, led_to: set[int]
+    ) -> None:
+        """Add the equilibrium where a branch passes the present value, or tell why there is none.
+
+        ``led_to`` are those that the branches it comes from have led to.
+        """
+        now = f"{line.name} {line.value:.4g}"
         if isinstance(there, str):
             self.failed.append(f"A branch passes {now}, but its equilibrium there was not reached: {there}.")
             return
@@ -266,9 +277,10 @@ class _Search:
             self.failed.append(f"A branch passes {now}, but its equilibrium there cannot be certified.")
             return
         self.on_branch.add(k)
-        if beside and k < known:
+        if beside and k in led_to:
             back = f"the way from there to {line.value:.4g} leads back to a known equilibrium"
             self.failed.append(f"A branch left at {line.name} {beside}; {back}. Try a finer mesh.")
+        led_to.add(k)
 
     def leaving(
         self, line: TracedParameter, branch: Branch, watch: Callable[[Progress], None]
@@ -302,7 +314,7 @@ class _Search:
                 ends.append(end)
                 if one.index == 1:
                     self.ways.append(WayDown(number, to, end))
-        if one.index > 1 and any(ends):
+        if any(ends) and (one.index > 1 or all(ends)):  # a barrier tells of the others
             lost = ", ".join(f"{end} ({ends.count(end)})" for end in sorted({*ends} - {""}))
             self.failed.append(f"The {len(ends)} ways down from a saddle of index {one.index}: {lost}.")
 

@@ -176,7 +176,7 @@ def compose(
     colors = color_scale([drawing.values for drawing in drawings], limits, cmap)
     heights = [frame.size[1] for frame in frames[::columns]]
     figure = new(width, sum(heights) + 100.0, pad=0.0)
-    if mark or any(drawing.title for drawing in drawings):
+    if mark or colors is not None or any(drawing.title for drawing in drawings):
         figure.get_layout_engine().set(h_pad=ABOVE / DPI)
     axes = grid(figure, len(frames), columns, height_ratios=heights)
     for place, drawing in zip(axes, drawings, strict=True):

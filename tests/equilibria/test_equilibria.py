@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+import volume_cases
 from refusals import refused
 
 from generators import (
@@ -22,7 +23,7 @@ from generators import (
     two_squares,
 )
 from generators.grid import grid_faces
-from pcmc import BoundaryMotion, Direction, Patch, Plane, Room, Surface, find_equilibria, follow, solve
+from pcmc import BoundaryMotion, Cable, Direction, Patch, Plane, Room, Surface, find_equilibria, follow, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.equilibria import branches, shape_distance
 from pcmc.equilibria.found import Equilibria, WayDown
@@ -117,6 +118,20 @@ def test_the_wide_catenoid_breaks_over_the_deep_one():
         errors.append(abs(found.barrier(1) - (deep.energy - wide.energy)))
     assert np.log2(errors[0] / errors[1]) > 1.8
     assert errors[1] < 0.02 * (deep.energy - wide.energy)
+
+
+def test_two_caps_under_one_gas_are_a_double_well():
+    """V = πh(3 + h²)/6, A = π(1 + h²): the pass has equal heights, minima have h and 1/h, of equal radii."""
+    h = np.array([1.25, 1.25, 1.642024, 1.0 / 1.642024])
+    volumes, areas = np.pi * h * (3.0 + h**2) / 6.0, np.pi * (1.0 + h**2)
+    assert volumes[:2].sum() == pytest.approx(volumes[2:].sum(), rel=1e-6)
+    pair = solve(volume_cases.connected_caps(volumes[:2].sum()), target="stationary")
+    found = find_equilibria(pair, Direction(volumes={"both": 1.0}), starts=0)
+    assert [one.index for one in found.found] == [0, 0, 1]
+    for one, other in ((1, 2), (2, 1)):
+        exact = areas[:2].sum() - areas[2:].sum()
+        assert found.barrier(one, other) == pytest.approx(exact, rel=0.1)
+    assert not found.failed  # both branches reach their minimum, also where a start has found it before
 
 
 def test_without_mmgpy_the_deep_catenoid_keeps_its_triangles(monkeypatch):
@@ -219,6 +234,28 @@ def test_a_crossing_without_an_equilibrium_is_named(monkeypatch):
     monkeypatch.setattr(Branch, "resume", higher)
     found = find_equilibria(spherical_cap(0.5), starts=0)
     assert "A branch passes pressure 1, but its equilibrium there cannot be certified." in str(found)
+
+
+def test_a_branch_that_ends_within_the_span_is_named(monkeypatch):
+    """Of an edge cable of chord 2 on a film of tension 1 the arcs end at the half circle, of tension 1."""
+    X = np.array([[x, y, 0.0] for x in np.linspace(-1.0, 1.0, 9) for y in np.linspace(0.0, 3.0, 13)])
+    rim, edge = (np.abs(X[:, 0]) == 1.0) | (X[:, 1] == 3.0), Cable.along("edge", 1.5, np.arange(0, 117, 13))
+    film = Surface(X, grid_faces(8, 12), [0] * 192, [Patch("film", 1.0, 0.0)], fixed=rim, cables=[edge])
+    (line,) = find_equilibria(film, Direction(cables={"edge": 1.0}), starts=0).failed
+    assert line.startswith("A branch ended at parameter 1.0")
+    assert "as triangles collapse; what lies beyond on it is not known" in line
+    monkeypatch.setattr(branches, "STEPS", 2)
+    one, other = find_equilibria(spherical_cap(0.5), starts=0).failed
+    assert "A branch ended at pressure 0.8" in one
+    assert "after 2 steps" in one
+    assert "after 2 steps" in other
+
+
+def test_why_no_branch_starts_at_an_equilibrium_is_said():
+    tube = volume_cases.cylinder(0.7, 2.0, "plates")
+    (line,) = find_equilibria(tube, "volume", starts=0).failed
+    assert line.startswith("No branch in volume starts at the equilibrium from the start given: follow: ")
+    assert "nothing holds the surface against 2 rigid motions" in line
 
 
 @pytest.mark.nightly
@@ -382,6 +419,10 @@ def test_numbers_of_equilibria_are_checked(caps):
         caps[0].barrier(2)
     with refused(OptionError, what="to"):
         caps[0].barrier(1, 2)
+    with refused(OptionError, what="start", found="1"):
+        caps[0].barrier("1")
+    with refused(OptionError, what="to", found="1"):
+        caps[0].barrier(1, "1")
     assert caps[0].barrier(1, 1) == 0.0
 
 
@@ -413,6 +454,17 @@ def test_minima_that_no_saddle_joins_are_named():
         "barrier from 1 to 2, 3: not known, as no saddle was found between them",
         "barrier from 1 to 4: not known, as no saddle was found between them",
     ]
+
+
+def test_a_saddle_from_which_no_way_leads_to_a_minimum_is_named():
+    """A roof of two tops, of which either runs away, farther than its triangles can follow."""
+    X = [[-3, -1, 0], [0, -1, 0], [3, -1, 0], [3, 1, 0], [0, 1, 0], [-3, 1, 0], [-1, 0, 1], [1, 0, 1]]
+    F = [[0, 1, 6], [1, 7, 6], [1, 2, 7], [2, 3, 7], [3, 4, 7], [4, 6, 7], [4, 5, 6], [5, 0, 6]]
+    roof = Surface(X, F, [0] * 8, [Patch("roof", 0.39)], fixed=range(6))
+    found = find_equilibria(roof, (), starts=0)
+    assert [one.index for one in found.found] == [1]
+    assert not found.barriers
+    assert "The 2 ways down from a saddle of index 1: pinches off or collapses (2)." in str(found)
 
 
 def test_a_search_that_is_stopped_keeps_what_it_has():

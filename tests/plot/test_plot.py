@@ -8,7 +8,7 @@ from PIL import Image
 from tents import tent
 
 import pcmc
-from generators import two_caps, two_squares
+from generators import spherical_cap, two_caps, two_squares
 from pcmc import plot
 from pcmc.explore.page_data import fields as page_fields
 from pcmc.explore.session import SessionState
@@ -234,6 +234,12 @@ def test_scalars_take_their_colours_and_nothing_is_grey():
     constant = plot.draw(surface, scalars=np.ones(surface.n), **options)
     nothing = plot.draw(surface, scalars=np.full(surface.n, np.nan), **options)
     assert constant.shape == nothing.shape
+
+
+def test_the_name_of_a_scale_is_not_cut_at_the_foot_of_a_picture():
+    surface = spherical_cap(0.3)
+    image = plot.draw(surface, scalars=surface.vertices[:, 2], label="gypq, length", width=800)
+    assert (image[-4:] == 255).all()
 
 
 def test_signed_values_get_a_symmetric_scale():

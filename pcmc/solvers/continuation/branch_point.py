@@ -147,7 +147,8 @@ def correct(start: BranchState, constraint: Constraint, tolerance: float) -> Bra
     last, slow = np.inf, 0
     for iteration in range(1, ITERATIONS + 2):
         if not mesh.line.allows(at.parameter):
-            raise NotOnBranch(f"a tension would reach 0 at the parameter {at.parameter:g}")
+            what = "volume would be" if "volumes" in mesh.line.rates else "tension would reach"
+            raise NotOnBranch(f"a {what} 0 at the parameter {at.parameter:g}")
         if iteration > 1 and at.quality < BRANCH_END:
             raise MeshCollapsed("triangles collapse")
         if iteration > 1 and mesh.reaches_plane(at.X).any():

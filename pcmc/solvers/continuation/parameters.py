@@ -167,8 +167,10 @@ class ParameterLine:
         }
 
     def allows(self, value: float) -> bool:
-        """Whether every varied tension is still positive at λ."""
+        """Whether every varied tension is still positive at λ, and no volume 0, which no room can have."""
         varied = self._varied(value)
+        if not np.all(varied.get("volumes", 1.0)):
+            return False
         return all((varied[kind] > 0.0).all() for kind in ("tensions", "cables") if kind in varied)
 
     def surface_at(self, surface: Surface, value: float) -> Surface:

@@ -105,6 +105,14 @@ def test_the_branch_passes_the_flat_disc():
     np.testing.assert_allclose(branch.last.pressures, -start.pressures, rtol=1e-3)
 
 
+def test_a_branch_ends_before_a_volume_of_0_which_no_room_can_have():
+    start = pcmc.solve(cap(0.5)).surface
+    branch = pcmc.follow(start, Direction(volumes={"room": 1.0}), 0.0, min_quality=0.3)
+    assert branch.ending.name == "LOST"
+    assert "a volume would be 0 at the parameter 0" in branch.message
+    assert 0.0 < branch.points.parameter.iloc[-1] < 1e-3
+
+
 def test_volumes_vary_together_with_tensions_up_to_an_energy():
     start = pcmc.solve(cap(0.5)).surface
     direction = Direction({"cap": 0.5}, relative=True, volumes={"room": 0.5})
