@@ -40,8 +40,8 @@ def triangle_families(lengths: Floats, tolerance: float, apart: bool = False) ->
     ``apart``: mirror images count as different, so edges correspond counter-clockwise.
 
     The families depend on the lengths alone, not on the order of triangles or the edge that each starts with,
-    nor on the rounding of equal lengths, as in a roof that is turned or, unless ``apart``, mirrored. Where two
-    edges are equal, ``order`` is counter-clockwise: such a triangle is its own mirror image.
+    nor on the rounding of equal lengths, as in a roof that is turned or, unless ``apart``, mirrored. Where
+    two edges are equal, ``order`` is counter-clockwise: such a triangle is its own mirror image.
     ``at_least`` counts triangles of which no two can share a family.
 
     >>> triangles = np.array([[3, 4, 5.0], [4, 5, 3.001], [5, 4, 3.0]])
