@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+import volume_cases
 from refusals import refused
-from volume_cases import connected_caps
 
 from generators import (
     catenoid,
@@ -125,7 +125,7 @@ def test_two_caps_under_one_gas_are_a_double_well():
     h = np.array([1.25, 1.25, 1.642024, 1.0 / 1.642024])
     volumes, areas = np.pi * h * (3.0 + h**2) / 6.0, np.pi * (1.0 + h**2)
     assert volumes[:2].sum() == pytest.approx(volumes[2:].sum(), rel=1e-6)
-    pair = solve(connected_caps(volumes[:2].sum()), target="stationary")
+    pair = solve(volume_cases.connected_caps(volumes[:2].sum()), target="stationary")
     found = find_equilibria(pair, Direction(volumes={"both": 1.0}), starts=0)
     assert [one.index for one in found.found] == [0, 0, 1]
     for one, other in ((1, 2), (2, 1)):
@@ -249,6 +249,13 @@ def test_a_branch_that_ends_within_the_span_is_named(monkeypatch):
     assert "A branch ended at pressure 0.8" in one
     assert "after 2 steps" in one
     assert "after 2 steps" in other
+
+
+def test_why_no_branch_starts_at_an_equilibrium_is_said():
+    tube = volume_cases.cylinder(0.7, 2.0, "plates")
+    (line,) = find_equilibria(tube, "volume", starts=0).failed
+    assert line.startswith("No branch in volume starts at the equilibrium from the start given: follow: ")
+    assert "nothing holds the surface against 2 rigid motions" in line
 
 
 @pytest.mark.nightly
