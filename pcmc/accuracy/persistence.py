@@ -119,11 +119,11 @@ def shape_order(surfaces: Sequence[Surface]) -> float:
     ends = np.flatnonzero(np.isfinite(slopes).all(axis=0))
     before, last = slopes[:, ends]
     rests, junction = _rests(surfaces[-3:])
-    always, sometimes = rests.all(axis=0), rests.any(axis=0)
+    always, sometimes = np.all(rests, axis=0), np.any(rests, axis=0)
     soon = (last <= FURTHER * (before - last)) & ~always[junction[ends]]  # what rests has no slope
-    if (sometimes & ~always).any() or soon.any():
+    if np.any(sometimes & ~always) or soon.any():
         return min(order, BEGINS)
-    return min(order, CONTACT) if always.any() or (last < before).any() else order
+    return min(order, CONTACT) if np.any(always) or (last < before).any() else order
 
 
 def _rests(surfaces: Sequence[Surface]) -> tuple[Bools, Ints]:
