@@ -137,7 +137,7 @@ class TracedParameter:
 
     def _reached(self, branch: Branch, rows: Sequence[int]) -> Surface | str:
         """The surface at the present value, from the first of some points that leads there; or why none."""
-        reason = ""
+        reason = "no regular point of the branch is beside it"
         for row in rows:
             try:
                 way = branch.resume(row, self.value)

@@ -236,6 +236,18 @@ def test_a_crossing_without_an_equilibrium_is_named(monkeypatch):
     assert "A branch passes pressure 1, but its equilibrium there cannot be certified." in str(found)
 
 
+def test_a_crossing_between_a_bifurcation_and_a_fold_has_no_point_to_start_from():
+    points = pd.DataFrame({"arclength": [0.0, 0.1], "parameter": [1.2, 1.3], "slope": [0.0, 1.0]})
+    folds = pd.DataFrame({"arclength": [0.05], "parameter": [0.9]})
+    way = SimpleNamespace(ending=Ending.REACHED, last="a surface")
+    branch = SimpleNamespace(points=points, folds=folds, resume=lambda row, value: way)
+    line = branches.TracedParameter("pressure", Direction({"cap": 1.0}), 1.0, (0.5, 1.5))
+    (one, beside), other = line.crossings(branch)
+    assert one == "no regular point of the branch is beside it"
+    assert beside == "1.2 and was first met at 0.9"
+    assert other == ("a surface", "")
+
+
 def test_a_branch_that_ends_within_the_span_is_named(monkeypatch):
     """Of an edge cable of chord 2 on a film of tension 1 the arcs end at the half circle, of tension 1."""
     X = np.array([[x, y, 0.0] for x in np.linspace(-1.0, 1.0, 9) for y in np.linspace(0.0, 3.0, 13)])
