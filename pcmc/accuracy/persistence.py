@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import FAILED
 from ..certificate import Certificate
 from ..certificate.balance import overload
@@ -22,6 +22,7 @@ from ..stability.equilibrium import Equilibrium
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.pieces import point_text
+from ..surface.topology import components
 from .extrapolation import LOWEST
 
 FAR = 0.25  # of the surface's extent: a finer surface this far away is another shape
@@ -107,19 +108,31 @@ def shape_order(surfaces: Sequence[Surface]) -> float:
     Infinite with fewer than three meshes, or where the last move is none beside the error of the shape: a
     coarse mesh may be at rest on the smooth surface itself, so that first moves are small and later ones
     larger. The error is how far the last refinement's new vertices are from the middles of their edges.
-    At most 3/2 where a junction rests on its bottom on all of these meshes, or will on far finer ones: that
-    where its rest ends. At most 1 where it begins to rest on these meshes, or will on the next ones.
+    At most 3/2 where a junction rests on its bottom on the last three meshes, or will on far finer ones: that
+    where its rest ends. At most 1 where one begins to rest on these meshes, or will on the next ones.
     """
     order = _order(surfaces, [_moves(a, b) for a, b in pairwise(surfaces[-3:])])
     if len(surfaces) < 3 or surfaces[0].periodic:
         return order
     # at an end it rises as c s - k s log(1/s): by k log 2 less on each finer mesh, until it rests
     slopes = np.array([_end_slopes(surface)[: surfaces[-2].n] for surface in surfaces[-2:]])
-    before, last = slopes[:, np.isfinite(slopes).all(axis=0)]
-    rests = [bool(standing_part(surface).resting.any()) for surface in surfaces[-3:]]
-    if not all(rests) and (any(rests) or (last <= FURTHER * (before - last)).any()):
+    ends = np.flatnonzero(np.isfinite(slopes).all(axis=0))
+    before, last = slopes[:, ends]
+    rests, junction = _rests(surfaces[-3:])
+    always, sometimes = np.all(rests, axis=0), np.any(rests, axis=0)
+    soon = (last <= FURTHER * (before - last)) & ~always[junction[ends]]  # what rests has no slope
+    if np.any(sometimes & ~always) or soon.any():
         return min(order, BEGINS)
-    return min(order, CONTACT) if all(rests) or (last < before).any() else order
+    return min(order, CONTACT) if np.any(always) or (last < before).any() else order
+
+
+def _rests(surfaces: Sequence[Surface]) -> tuple[Bools, Ints]:
+    """(meshes,n) whether junction k rests somewhere on a mesh, and (n,) the k of the last one's vertices."""
+    junction = components(find_walls(surfaces[-1], held=True).top_edges, surfaces[-1].n)
+    rests = np.zeros((len(surfaces), surfaces[-1].n), dtype=bool)
+    for row, surface in zip(rests, surfaces, strict=True):
+        row[junction[np.flatnonzero(standing_part(surface).resting)]] = True
+    return rests, junction
 
 
 def _end_slopes(surface: Surface) -> Floats:

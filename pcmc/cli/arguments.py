@@ -158,7 +158,7 @@ def load_project(file: Path, units: str = "") -> Project:
 def output_of(file: Path, **output: Any) -> Output:
     """What a command writes, in the terms of a project; refused before any work if it cannot be written."""
     wanted = Output(**output)
-    check_outputs(wanted.paths, inputs=files_of(file))
+    check_outputs(wanted.paths, inputs=files_of(file), pictures=[wanted.picture])
     return wanted
 
 

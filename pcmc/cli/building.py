@@ -112,7 +112,7 @@ def panels_(
             raise FileError(text, what=str(path), found=suffix)
         outputs += schedule_paths(path) if suffix == CSV else [path]
         outputs += cost_paths(path) if suffix == CSV and prices is not None else []
-    check_outputs(outputs, inputs=files_of(file))
+    check_outputs(outputs, inputs=files_of(file), pictures=[picture])
     how: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": build.allow_uncertified}
     with working() as progress:
         roof = build.roof(arguments.load_project(file), progress)
@@ -159,7 +159,7 @@ def _net(
     check_grid(pattern, direction)
     outputs = Output(picture=picture, view=seen, sheet=sheet or "A1").paths
     outputs += [one for path in files for one in table_paths(path, NET_TABLES)]
-    check_outputs(outputs, inputs=files_of(file))
+    check_outputs(outputs, inputs=files_of(file), pictures=[picture])
     with working() as progress:
         roof = build.roof(arguments.load_project(file, units), progress)
         progress("laying out panels")

@@ -56,9 +56,10 @@ def equilibria_(
     surfaces = [path for path in files if path.suffix.lower() not in (*PICTURES, TABLE)]
     projects.Output(files=surfaces)  # refuses an unknown format
     numbered = [_numbered(path, k) for path in surfaces for k in range(1, 100)]  # as many as may be found
-    check_outputs([*files, *numbered], inputs=files_of(file))
+    pictures = [path for path in files if path.suffix.lower() in PICTURES]
+    check_outputs([*files, *numbered], inputs=files_of(file), pictures=pictures)
     arguments.validate.choice("--axis", axis, BRANCH_VALUES)
-    if axis != "height" and not any(path.suffix.lower() in PICTURES for path in files):
+    if axis != "height" and not pictures:
         raise OptionError("--axis: is of the diagram; add -o diagram.svg, or leave it out", what="--axis")
     if seed and not starts:
         raise OptionError("--seed: is of random starts; leave out --starts 0, or the seed", what="--seed")
@@ -69,7 +70,7 @@ def equilibria_(
         found = find_equilibria(roof.shown.surface, along or "pressure", callback=progress, **options)
         jobs: list[Any] = []
         for path in files:
-            if path.suffix.lower() in PICTURES:
+            if path in pictures:
                 jobs.append((path, partial(diagram, found, y=axis, units=roof.units)))
             elif path.suffix.lower() == TABLE:
                 jobs.append((path, partial(found.table.to_csv, index=False)))

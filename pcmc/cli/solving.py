@@ -14,7 +14,6 @@ from ..accuracy.varied import Varied
 from ..base import validate
 from ..base.errors import OptionError
 from ..base.files import suffix_of
-from ..base.libraries import require
 from ..certificate.quantities import dimension_of
 from ..io import FORMATS
 from ..project import Outcome, Project
@@ -253,11 +252,10 @@ def sweep(
       pcmc sweep generators:two_caps alpha_large=3,4,5 --csv caps.csv
     """
     inputs = files_of(what) if Path(what).exists() else ()
-    check_outputs([path for path in (csv, store, plot) if path is not None], inputs=inputs)
+    outputs = [path for path in (csv, store, plot) if path is not None]
+    check_outputs(outputs, inputs=inputs, pictures=[plot])
     if csv is not None:
         suffix_of(csv, TABLES, "a table")
-    if plot is not None:
-        require("matplotlib", extra="plot")
     if every and csv is None:
         raise OptionError("--all: is of the table in a file; name it with --csv", what="--all")
     check_names((), plot)

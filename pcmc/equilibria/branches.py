@@ -56,12 +56,12 @@ class TracedParameter:
             validate.refuse("span", (low, high), f"numbers below and above the present value {value:g}")
         return cls(name, parameter, value, (low, high))
 
-    def halves(self, surface: Surface, watch: Callable[[Progress], None]) -> tuple[Branch, Branch] | None:
-        """The branch through a surface, each way to the end of the span; None if none starts there."""
+    def halves(self, surface: Surface, watch: Callable[[Progress], None]) -> tuple[Branch, Branch] | str:
+        """The branch through a surface, each way to the end of the span; or why none starts there."""
         try:
             return self._half(surface, -1.0, watch), self._half(surface, 1.0, watch)
-        except NoBranch:
-            return None
+        except NoBranch as error:
+            return str(error)
 
     def early_end(self, branch: Branch) -> str:
         """Where and why a branch ends within the span; "" if it leads out of it."""
@@ -137,7 +137,7 @@ class TracedParameter:
 
     def _reached(self, branch: Branch, rows: Sequence[int]) -> Surface | str:
         """The surface at the present value, from the first of some points that leads there; or why none."""
-        reason = ""
+        reason = "no regular point of the branch is beside it"
         for row in rows:
             try:
                 way = branch.resume(row, self.value)

@@ -241,8 +241,8 @@ class _Search:
             self.failed.append(f"{text}, as that moves the vertices of the boundary.")
             return
         halves = line.halves(start, watch)
-        if halves is None:
-            self.failed.append(f"No branch in {line.name} starts at the equilibrium {how}.")
+        if isinstance(halves, str):
+            self.failed.append(f"No branch in {line.name} starts at the equilibrium {how}: {halves}.")
             return
         self.tell_early_ends(line, halves)
         level, how, led_to = [join_branches(*halves)], f"on a branch in {line.name}", {number}

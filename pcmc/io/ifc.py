@@ -344,4 +344,5 @@ def read(path: Path) -> MeshData:
     if metadata.counts is not None:  # a vertex of two patches is in both, so vertices count for nothing
         metadata.check_counts(metadata.counts[0], sum(len(faces) for *_, faces in meshes))
     support = np.array(list(map(int, "".join(part["supports"] for part in arrays["parts"]))), dtype=np.int8)
-    return metadata.of_meshes(meshes, support=support, walls=arrays["walls"])
+    notes = ["its place on a map is left out"] * arrays["placed"]
+    return metadata.of_meshes(meshes, support=support, walls=arrays["walls"], notes=notes)

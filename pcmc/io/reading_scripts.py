@@ -101,7 +101,8 @@ def ifc_arrays(path: str) -> dict[str, Any]:
 
     get_pset: Any = element.get_pset
     model: Any = ifcopenshell.open(path)
-    found: dict[str, Any] = {"text": None, "walls": None, "parts": []}
+    placed = bool(model.by_type("IfcMapConversion"))
+    found: dict[str, Any] = {"text": None, "walls": None, "parts": [], "placed": placed}
     for roof in model.by_type("IfcRoof"):
         texts = get_pset(roof, "Pcmc_Surface")
         if not texts:

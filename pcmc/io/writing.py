@@ -90,6 +90,8 @@ def write(
     if not isinstance(scalars, Mapping | None):
         refuse("scalars", scalars, "arrays by name, such as {'height': [...]}")
     scalars = {name: _scalar(surface, name, value) for name, value in (scalars or {}).items()}
+    if not isinstance(georeference, Georeference | None):
+        refuse("georeference", georeference, "a Georeference or None")
     units = as_units("" if units is None else units)
     carried = form.carried(surface, scalars)
     lost = [name for name in scalars if name not in carried]

@@ -20,7 +20,7 @@ MOST_WINDOWS = 256  # places of a cube that are tried for each family
 ROUNDS = 60  # of the search for fewer families
 WORK = 200_000_000  # triangles × families × rounds: large meshes get fewer rounds
 SHARE = 0.25  # of the families that are dissolved in each round
-STEPS = 1e9  # in a tolerance: lengths are rounded to a step, so that equal ones are equal
+STEPS = 1e6  # in a tolerance: lengths are rounded to a step, so that equal ones are equal
 TURNS = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])  # the edges counter-clockwise, from each of them
 
 
@@ -35,12 +35,13 @@ class Families(NamedTuple):
 def triangle_families(lengths: Floats, tolerance: float, apart: bool = False) -> Families:
     """Families of triangles with edge lengths (m,3), counter-clockwise, length.
 
-    In a family, corresponding edges of every two triangles differ in length by at most ``tolerance``.
+    In a family, corresponding edges of every two triangles differ in length by at most ``tolerance``, to a
+    millionth of it.
     ``apart``: mirror images count as different, so edges correspond counter-clockwise.
 
     The families depend on the lengths alone, not on the order of triangles or the edge that each starts with,
-    nor on the rounding of equal lengths, as in a roof that is turned. Where two edges are equal, ``order`` is
-    counter-clockwise: such a triangle is its own mirror image.
+    nor on the rounding of equal lengths, as in a roof that is turned or, unless ``apart``, mirrored. Where
+    two edges are equal, ``order`` is counter-clockwise: such a triangle is its own mirror image.
     ``at_least`` counts triangles of which no two can share a family.
 
     >>> triangles = np.array([[3, 4, 5.0], [4, 5, 3.001], [5, 4, 3.0]])

@@ -127,7 +127,7 @@ def run_project(
     progress = progress or ignore
     project = project if project.folder is not None else project.in_folder(project.path.parent)
     outputs = project.output.paths
-    check_outputs(outputs, project.folder, inputs=project.inputs)
+    check_outputs(outputs, project.folder, inputs=project.inputs, pictures=[project.output.picture])
     outcome = solve_from_start(project, progress, changed)
     if project.output.whole:
         progress("certifying the whole")

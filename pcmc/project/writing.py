@@ -218,11 +218,25 @@ def draw_picture(
         panel([surface] * len(views), path, views=views, **look)
 
 
-def check_outputs(paths: Iterable[Path], made: Path | None = None, *, inputs: Iterable[Path] = ()) -> None:
+def check_outputs(
+    paths: Iterable[Path],
+    made: Path | None = None,
+    *,
+    inputs: Iterable[Path] = (),
+    pictures: Iterable[PathLike | None] | None = None,
+) -> None:
     """Refuse, before any work, paths that cannot be written, as a library is missing, too; and those of a
     command's own ``inputs``, also by links and other ways to write them. The folder ``made`` may be missing.
+    With the paths that are ``pictures``, what draws these and documents must be there, too.
     """
     paths = list(paths)
+    if pictures is not None:
+        drawn = {Path(picture) for picture in pictures if picture is not None}
+        documents = [path for path in paths if path.suffix.lower() == ".pdf" and path not in drawn]
+        if documents:
+            require("reportlab", extra="report")
+        if documents or drawn:
+            require("matplotlib", extra="plot")
     for library, extra, suffixes in WRITERS:
         if any(path.suffix.lower() in suffixes for path in paths):
             require(library, extra=extra)

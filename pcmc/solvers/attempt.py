@@ -12,6 +12,7 @@ from ..base import validate
 from ..base.errors import OptionError
 from ..base.tolerances import AT_REST, COLLAPSED, NOISE, POOR, ROUNDED_REST, SHRUNK
 from ..forces.functional import patch_areas
+from ..forces.loose_parts import patch_residuals
 from ..meshing.quality import worst_quality
 from ..stability.equilibrium import SecondVariation
 from ..stability.modes import clear_of_zero
@@ -39,8 +40,9 @@ class NewtonOptions:
     Parameters
     ----------
     tolerance : converged when ‖Bᵀ∇E‖ ≤ tolerance × the norm of the single triangles' forces, or when it
-        is below 1e-10 of that norm and rounding lets no step lower it further, or below what rounding
-        of coordinates far from 0 leaves of it, and below 1e-9.
+        is below 1e-10 of that norm and rounding lets no step lower it further; or, in each patch too,
+        below 1e-9 and what rounding of the coordinates leaves of it (ε |X| over the mean edge), as in
+        those of a survey.
     iterations : the most steps of any kind, on each level and in each attempt. ``pcmc.solve`` ends its search
         where one takes as many as were asked for: with ``iterations=1`` there is one step in all.
     target : ``"minimum"`` leaves saddles; ``"stationary"`` converges to them.
@@ -195,8 +197,15 @@ class NewtonRun:
         """Whether the residual is below the tolerance, or as low as rounding lets it become."""
         residual, rounding = self.state.at.residual, self.state.rounding
         no_progress = self.stuck or self.steps_since_best > PATIENCE
-        least = max(ROUNDED_REST, NOISE * rounding) if no_progress else min(rounding, SURE * AT_REST)
-        return residual <= max(self.options.tolerance, least)
+        if residual <= self.options.tolerance:
+            return True
+        if no_progress:
+            return residual <= max(ROUNDED_REST, NOISE * rounding)
+        at, least = self.state.at, min(rounding, SURE * AT_REST)
+        if residual > least:
+            return False
+        own = patch_residuals(at.shape, at.classes, at.unbalanced)  # weak ones hide in the residual
+        return bool(own.max() <= least)
 
     def _leave_rest(self) -> bool:
         """Leave a saddle if a minimum is sought, or lift a resting junction; False if neither is due."""

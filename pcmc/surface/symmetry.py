@@ -162,7 +162,7 @@ def mirrored(surface: Surface, planes: Sequence[Plane | str] | None = None) -> S
 
     Raises
     ------
-    SurfaceError : no mirror planes; images that never end, as between parallel planes, or overlap.
+    SurfaceError : no mirror planes; images that overlap, or never end, as between parallel planes.
 
     >>> from pcmc import Patch
     >>> wall = Plane(normal=(1, 0, 0), mirror=True)
@@ -296,7 +296,8 @@ def _endless(planes: Sequence[Plane]) -> str:
         if abs(angle - nearest) > math.degrees(PARALLEL):
             text = f"the {one} and the {other} meet at {angle:.9g}°, not at 180° over a whole number such as"
             return f"{text} {nearest:.9g}°; give the ends of the mirrors with all digits"
-    return "some planes are parallel; name those to unfold at: mirrored(surface, planes=[…])"
+    text = "some planes are parallel, or nearly, or enclose a prism"
+    return f"{text}; name those to unfold at: mirrored(surface, planes=[…])"
 
 
 def _joined(chosen: Bools, next_to: Sequence[Ints]) -> Ints:

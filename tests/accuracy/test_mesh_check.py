@@ -1,5 +1,7 @@
 """The mesh check: error bars that hold the true error, all verdicts, bad input refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -329,6 +331,21 @@ def test_bars_count_that_a_junction_begins_to_rest_on_the_finest_mesh():
         (bar, limit), finer = first.row("height", name)[["limit_error", "limit"]], truth.row("height", name)
         assert abs(limit - finer.limit) <= bar + finer.limit_error
         assert bar < 0.01 * limit
+
+
+def test_a_junction_begins_to_rest_beside_one_that_rests_on_all_meshes():
+    """Each counts by itself: with the heavy wall alone the order is that where a rest ends."""
+    light = Divider({"arc": [[5.04, 0], [5.79, 3.42], [5.92, 6.84]]}, wall=2.4)
+    heavy = Divider([[10.5, 0], [10.5, 6.84]], wall=6.0)
+    corners = [[0, 0], [15, 0], [15, 6.84], [0, 6.84]]
+    plan = Plan(corners, [light, heavy], edge_length=0.98, tension=3.31)
+    surfaces = check_mesh(solve(plan.surface())).surfaces
+    rest = [surface.vertices[standing_part(surface).resting, 0] for surface in surfaces]
+    assert [bool((x > 7.0).any()) for x in rest] == [True, True, True]
+    assert [bool((x < 7.0).any()) for x in rest] == [False, False, True]
+    assert shape_order(surfaces) == 1.0
+    alone = replace(plan, dividers=plan.dividers[1:])
+    assert shape_order(check_mesh(solve(alone.surface())).surfaces) == 1.5
 
 
 def test_bars_count_that_a_junction_will_rest_on_its_bottom():

@@ -398,6 +398,9 @@ def test_without_shapely_plans_alone_are_refused(folder):
     [
         ("trimesh", ["solve", "roof.toml", "-o", "roof.glb"], "files"),
         ("ezdxf", ["draw", "roof.toml", "-o", "roof.dxf"], "cad"),
+        ("reportlab", ["draw", "roof.toml", "-o", "roof.pdf"], "report"),
+        ("matplotlib", ["report", "roof.toml", "-o", "roof.pdf"], "plot"),
+        ("matplotlib", ["plot", "roof.toml", "roof.svg"], "plot"),
         ("matplotlib", ["sweep", "roof.toml", "roof.tension=2,3", "--plot", "roof.svg"], "plot"),
     ],
 )

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+import volume_cases
 from refusals import refused
-from volume_cases import connected_caps
 
 from generators import (
     catenoid,
@@ -125,7 +125,7 @@ def test_two_caps_under_one_gas_are_a_double_well():
     h = np.array([1.25, 1.25, 1.642024, 1.0 / 1.642024])
     volumes, areas = np.pi * h * (3.0 + h**2) / 6.0, np.pi * (1.0 + h**2)
     assert volumes[:2].sum() == pytest.approx(volumes[2:].sum(), rel=1e-6)
-    pair = solve(connected_caps(volumes[:2].sum()), target="stationary")
+    pair = solve(volume_cases.connected_caps(volumes[:2].sum()), target="stationary")
     found = find_equilibria(pair, Direction(volumes={"both": 1.0}), starts=0)
     assert [one.index for one in found.found] == [0, 0, 1]
     for one, other in ((1, 2), (2, 1)):
@@ -236,6 +236,18 @@ def test_a_crossing_without_an_equilibrium_is_named(monkeypatch):
     assert "A branch passes pressure 1, but its equilibrium there cannot be certified." in str(found)
 
 
+def test_a_crossing_between_a_bifurcation_and_a_fold_has_no_point_to_start_from():
+    points = pd.DataFrame({"arclength": [0.0, 0.1], "parameter": [1.2, 1.3], "slope": [0.0, 1.0]})
+    folds = pd.DataFrame({"arclength": [0.05], "parameter": [0.9]})
+    way = SimpleNamespace(ending=Ending.REACHED, last="a surface")
+    branch = SimpleNamespace(points=points, folds=folds, resume=lambda row, value: way)
+    line = branches.TracedParameter("pressure", Direction({"cap": 1.0}), 1.0, (0.5, 1.5))
+    (one, beside), other = line.crossings(branch)
+    assert one == "no regular point of the branch is beside it"
+    assert beside == "1.2 and was first met at 0.9"
+    assert other == ("a surface", "")
+
+
 def test_a_branch_that_ends_within_the_span_is_named(monkeypatch):
     """Of an edge cable of chord 2 on a film of tension 1 the arcs end at the half circle, of tension 1."""
     X = np.array([[x, y, 0.0] for x in np.linspace(-1.0, 1.0, 9) for y in np.linspace(0.0, 3.0, 13)])
@@ -249,6 +261,13 @@ def test_a_branch_that_ends_within_the_span_is_named(monkeypatch):
     assert "A branch ended at pressure 0.8" in one
     assert "after 2 steps" in one
     assert "after 2 steps" in other
+
+
+def test_why_no_branch_starts_at_an_equilibrium_is_said():
+    tube = volume_cases.cylinder(0.7, 2.0, "plates")
+    (line,) = find_equilibria(tube, "volume", starts=0).failed
+    assert line.startswith("No branch in volume starts at the equilibrium from the start given: follow: ")
+    assert "nothing holds the surface against 2 rigid motions" in line
 
 
 @pytest.mark.nightly

@@ -17,7 +17,7 @@ from tents import tent
 
 import pcmc
 from pcmc import cli
-from pcmc.base.errors import FileError, LostWarning, MissingExtra, OptionError
+from pcmc.base.errors import FileError, FileWarning, LostWarning, MissingExtra, OptionError
 from pcmc.base.units import FORCES, LENGTHS, Units, length_factor
 from pcmc.forces.functional import patch_areas
 from pcmc.io import Georeference
@@ -80,6 +80,10 @@ def test_it_is_on_a_map(tmp_path, unit, x):
     assert geolocation.auto_xyz2enh(model, x, y, z) == pytest.approx(expected, abs=1e-6)
     with pytest.warns(LostWarning, match="cannot carry .*its place on a map"):
         pcmc.write(tmp_path / "a.obj", surface, units=unit, georeference=place)
+    with pytest.warns(FileWarning, match="a.ifc: its place on a map is left out"):
+        pcmc.read(tmp_path / "a.ifc")
+    with refused(OptionError, what="georeference", found="EPSG:25832", expected="a Georeference or None"):
+        pcmc.write(tmp_path / "a.ifc", surface, units=unit, georeference="EPSG:25832")
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.cli import main
 from pcmc.panelling.families import triangle_families
+from pcmc.plan import Plan
 from pcmc.report.tables import MOST_FAMILIES
 from pcmc.report.words import panel_text
 from pcmc.surface.distance import distances
@@ -129,6 +130,18 @@ def test_a_roof_that_is_turned_has_the_same_schedule(tolerance):
         assert np.array_equal(before.panels["family"], after.family + 1)
         sizes = np.take_along_axis(lengths, after.order, axis=1)
         assert before.panels[["a", "b", "c"]].to_numpy() == pytest.approx(sizes, abs=1e-9)
+
+
+def test_a_fine_tolerance_does_not_part_equal_lengths():
+    """Rounded to 1e-9 of it, lengths that differ by rounding alone fell to both sides of a step."""
+    outline, divider = [[0, 0], [12, 0], [12, 8], [0, 8]], [[4, 0], [4, 8]]
+    roof = Plan(outline, [divider], edge_length=1.0, tension=5.0).surface()
+    before = triangle_families(edge_lengths(roof), 1e-4, apart=True).family
+    rng = np.random.default_rng(0)
+    for _ in range(4):
+        turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        after = triangle_families(edge_lengths(roof.moved(roof.vertices @ turn)), 1e-4, apart=True).family
+        assert np.array_equal(before, after)
 
 
 def test_a_row_of_triangles_needs_as_few_families_as_intervals():

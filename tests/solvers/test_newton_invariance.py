@@ -13,7 +13,8 @@ from nightly import at_night
 from shapes import rotation
 from starts import bezier_hall, double_bubble, four_fans, joined_caps, spherical_cap, two_caps, two_squares
 
-from pcmc import Patch, Plane, Surface, mean_curvature, solve
+from generators.grid import grid_faces
+from pcmc import Patch, Plane, Surface, Verdict, mean_curvature, solve
 
 pytestmark = pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 
@@ -178,3 +179,15 @@ def test_drawn_in_a_survey_s_coordinates(name, shift):
         here.certificate.reactions,
         atol=1e-7 * np.abs(here.certificate.reactions).max(),
     )
+
+
+@pytest.mark.parametrize("tension", [1e-5, 1e-7])
+def test_a_weak_patch_comes_to_rest_in_a_survey_s_coordinates(tension):
+    """Beside a strong one its forces hardly count in the residual, and rounding hides none of them."""
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(17.0), np.arange(9.0), indexing="ij"))
+    faces, shift = grid_faces(16, 8), np.array([4.5e5, 5.4e6, 0.0])
+    corners = np.column_stack([x, y, 0.0 * x]) + shift
+    patches = [Patch("strong", 1.0, 0.0), Patch("weak", tension, 0.2 * tension)]
+    weak, held = (x[faces].mean(axis=1) > 8.0).astype(int), (x % 8.0 == 0.0) | (y % 8.0 == 0.0)
+    result = solve(Surface(corners, faces, weak, patches, fixed=held, plane=Plane(shift)))
+    assert result.certificate.verdict is Verdict.STABLE, result.certificate.detail

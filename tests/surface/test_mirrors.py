@@ -358,6 +358,20 @@ def test_mirrors_of_rounded_coordinates_are_told_the_angle():
         mirrored(sixth.surface())
 
 
+def test_mirrors_around_a_triangle_never_end_though_none_are_parallel():
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.75**0.5, 0], [0.5, 0.75**0.5 / 3.0, 0.2]])
+    sides = [(0, 1), (1, 2), (2, 0)]
+    across = [np.cross(corners[end] - corners[start], [0, 0, 1]) for start, end in sides]
+    planes = {Plane(corners[side[0]], n, mirror=True): side for side, n in zip(sides, across, strict=True)}
+    faces, roof = [[0, 1, 3], [1, 2, 3], [2, 0, 3]], [Patch("roof", 1.0)]
+    piece = Surface(corners, faces, [0] * 3, roof, fixed=[3], on_planes=planes)
+    with pytest.raises(
+        SurfaceError, match="never end: some planes are parallel, or nearly, or enclose a prism"
+    ):
+        mirrored(piece)
+    assert mirrored(piece, list(planes)[:2]).m == 18
+
+
 def test_what_mirror_planes_refuse():
     whole = two_squares(4)
     given = whole.vertices, whole.faces, whole.patch_of_face, whole.patches

@@ -79,7 +79,8 @@ class Branch:
 
         Events are points of them, too. A diagram draws them solid where stable, and dashed elsewhere.
         """
-        columns = ["arclength", x, y]
+        known = self.points.columns.intersection(self.events.columns).tolist()
+        columns = ["arclength", *(validate.choice("column", name, known) for name in (x, y))]
         events = self.events[columns].assign(index=self.events.index_after)
         every = np.concatenate([self.points[[*columns, "index"]].to_numpy(float), events.to_numpy(float)])
         every = every[np.argsort(every[:, 0], kind="stable")]
@@ -177,8 +178,9 @@ class Branch:
         >>> float(between.parameter), float((3 * between.height**2).round(6))
         (0.6666666666666666, 1.0)
         """
-        if row not in self.surfaces:
+        if validate.integer("row", row) not in self.surfaces:
             validate.refuse("row", row, "a row of points with its surface stored")
+        stop = validate.number("stop", stop)
         value = float(self.points.parameter[row])
         chosen = replace(self._options, step=math.copysign(self._options.step, stop - value))
         line, goals = replace(self._known_line("resume"), value=value), _goals(stop, None)

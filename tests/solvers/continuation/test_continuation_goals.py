@@ -240,6 +240,18 @@ def test_tensions_that_are_zero_have_no_ratio_and_no_branch():
         Direction.ratio(start, "left", "wall")
 
 
+def test_what_a_branch_is_asked_for_is_checked(small_cap):
+    branch = follow(small_cap, "cap", steps=1)
+    for row in ("1", [1], True, -1, 9):
+        with refused(OptionError, what="row", found=row):
+            branch.resume(row, 0.7)
+    for stop in ("0.7", None):
+        with refused(OptionError, what="stop", found=stop):
+            branch.resume(1, stop)
+    with refused(OptionError, what="column", found="hight"):
+        branch.pieces("parameter", "hight")
+
+
 def test_remeshing_without_its_library_is_refused_at_once(monkeypatch):
     monkeypatch.setattr("pcmc.solvers.continuation.branch.find_spec", lambda name: None)
     with pytest.raises(MissingExtra, match=r"pcmc-surfaces\[remesh\]"):
