@@ -162,7 +162,7 @@ def mirrored(surface: Surface, planes: Sequence[Plane | str] | None = None) -> S
 
     Raises
     ------
-    SurfaceError : no mirror planes; images that never end, as between parallel planes, or overlap.
+    SurfaceError : no mirror planes; images that overlap, or never end, as between parallel planes.
 
     >>> from pcmc import Patch
     >>> wall = Plane(normal=(1, 0, 0), mirror=True)
