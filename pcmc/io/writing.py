@@ -99,7 +99,7 @@ def write(
         choice("colour", colour, [name for name, scalar in scalars.items() if len(scalar) == surface.n])
         if not form.colours:
             lost.append(f"colours of {colour!r}")
-    if certificate is not None and not form.certificate:
+    if certificate not in (None, {"mark": mark}) and not form.certificate:
         lost.append("certificate")
     lost += form.lost(surface, units)
     besides = {"members": members, "cable_areas": cable_areas, "georeference": georeference}
@@ -125,7 +125,7 @@ def write(
             text = f"certificate: expected a Certificate, found {found}"
             raise FileError(text, what="certificate", found=found)
         findings = {name: getattr(certificate, name) for name in findings.FILED}
-    if findings:
+    if findings or (mark and form.certificate):
         findings = {**findings, "mark": mark}
     mark = ", ".join(filter(None, (part_of_roof(surface.on_planes), mark)))
     about = metadata, carried, colour, findings, walls, units, bare, members, cable_areas or {}, mark

@@ -100,3 +100,18 @@ def test_large_and_small_numbers_have_as_many_digits_as_others(page):
     )
     shown = page.driver.execute_async_script(script, [51234567, -0.000051234567, 5.1e7, 51234.567])
     assert shown == ["5.123e+7", "-5.123e-5", "5.1e+7", "51230"]
+
+
+def test_no_two_numbers_at_an_axis_read_alike(page):
+    """A roof in millimetres whose height hardly changes. Before, it had 1235 twice, and 1236."""
+    script = """import('./page/diagram.js').then(({ showDiagram }) => {
+        const root = document.createElement('div');
+        root.innerHTML = '<div class="diagram"></div><ol></ol><div class="detail"></div>';
+        const pieces = [{ stable: true, points: [[1, 1234.3], [2, 1236.8]] }];
+        const branches = [{ pieces, parameter: [], height: [], index: [], number: [] }];
+        showDiagram(root, { parameter: 'p', value: 1, branches, equilibria: [], words: [] }, {}, () => {});
+        arguments[0]([...root.querySelectorAll('text')].map((text) => text.textContent));
+    })"""
+    marks = page.driver.execute_async_script(script)
+    assert {"1234.5", "1235", "1235.5"} <= set(marks)
+    assert len(marks) == len(set(marks))

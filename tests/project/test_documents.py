@@ -257,8 +257,12 @@ def test_files_have_the_mark_of_a_roof_that_is_not_in_order(tmp_path, monkeypatc
         assert {suffix: read(Path(f"roof{suffix}")) for suffix, read in MARKED.items()} == dict.fromkeys(
             MARKED, mark
         )
-        assert cli.main(["convert", "roof.pcmc", "again.obj"]) == 0
-        assert MARKED[".obj"](Path("again.obj")) == mark
+        io.write(
+            "bare.pcmc", io.read("roof.pcmc"), mark=mark
+        )  # without a certificate, as is an unfolded roof
+        for name in ("roof.pcmc", "bare.pcmc"):
+            assert cli.main(["convert", name, "again.obj"]) == 0
+            assert MARKED[".obj"](Path("again.obj")) == mark
     else:
         assert not any(b"NOT" in Path(name).read_bytes() for name in names)
     assert drawn == [mark]

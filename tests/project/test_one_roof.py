@@ -75,7 +75,7 @@ def counted(monkeypatch, *places):
 )
 def test_loading_a_project_meshes_nothing(folder, monkeypatch, text):
     Path("roof.toml").write_text(text, encoding="utf-8")
-    calls = counted(monkeypatch, "pcmc.plan.build.build_surface")
+    calls = counted(monkeypatch, "pcmc.plan.plan.build_surface")
     roof = project.load("roof.toml")
     assert calls == []
     project.surface_of(roof)

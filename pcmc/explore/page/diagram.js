@@ -20,7 +20,7 @@ function range(values) {
   return [low - room, high + room];
 }
 
-/** Two to six round numbers between these, the same distance apart. */
+/** Two to seven round numbers between these, the same distance apart. */
 function ticks(low, high) {
   const unit = 10 ** Math.floor(Math.log10((high - low) / 3));
   const step = unit * [1, 2, 5].findLast((times) => times * unit <= (high - low) / 2.5);
@@ -47,10 +47,13 @@ export function showDiagram(root, { parameter, value, branches, equilibria, word
     drawn("text", { x: WIDTH - PAD, y: HEIGHT - 4, "text-anchor": "end" }, parameter),
     drawn("text", { x: 2, y: PAD + 2 }, `height${unit}`),
   );
-  const label = (value, at) => drawn("text", { "text-anchor": "end", ...at }, digits(value));
+  const label = (value, span, at) => {
+    const count = 2 + Math.ceil(Math.log10(Math.abs(value) / span)); // that tell it from the next
+    return drawn("text", { "text-anchor": "end", ...at }, digits(value, Math.max(4, count)));
+  };
   svg.append(
-    ...ticks(x0, x1).map((p) => label(p, { x: x(p), y: HEIGHT - BOTTOM + 13, "text-anchor": "middle" })),
-    ...ticks(y0, y1).map((h) => label(h, { x: LEFT - 4, y: y(h) + 4 })),
+    ...ticks(x0, x1).map((p) => label(p, x1 - x0, { x: x(p), y: HEIGHT - BOTTOM + 13, "text-anchor": "middle" })),
+    ...ticks(y0, y1).map((h) => label(h, y1 - y0, { x: LEFT - 4, y: y(h) + 4 })),
   );
   const shown = (number) => {
     for (const one of svg.querySelectorAll("circle")) one.setAttribute("aria-current", one.dataset.number === String(number));
