@@ -85,9 +85,18 @@ _NAMES = {
     "solvers.continuation": ("BoundaryMotion", "Direction", "follow"),
     "solvers.neighbours": ("NeighbourSwap", "swap_neighbours"),
     "panelling": ("FewerFamilies", "PanelNet", "Panels", "fewer_families", "panel_net", "panels"),
-    "surface": ("Cable", "Circle", "Line", "Patch", "Plane", "Room", "Surface"),
-    "surface.images": ("images_in",),
-    "surface.symmetry": ("cut", "mirrored"),
+    "surface": (
+        "Cable",
+        "Circle",
+        "Line",
+        "Patch",
+        "Plane",
+        "Room",
+        "Surface",
+        "cut",
+        "images_in",
+        "mirrored",
+    ),
     "certificate.theorem": ("Theorem", "verify"),
 }
 

@@ -5,11 +5,12 @@ Gives ``Patch``, ``Plane``, ``Line``, ``Circle``, ``Curve``, ``Cable``, ``Room``
 """
 
 from .guides import Circle, Guide, Line, Plane
+from .halving import cut
 from .held_curve import HeldCurve
 from .images import images_in
 from .parts import Cable, Patch, Room
 from .surface import Surface, expect_surface
-from .symmetry import cut, mirrored, unfolded
+from .symmetry import mirrored, unfolded
 
 __all__ = ["Cable", "Circle", "Guide", "HeldCurve", "Line", "Patch", "Plane", "Room", "Surface"]
 __all__ += ["cut", "expect_surface", "images_in", "mirrored", "unfolded"]
