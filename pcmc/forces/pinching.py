@@ -250,16 +250,16 @@ def top_spacing(surface: Surface, walls: Walls) -> Floats:
 def lift(
     surface: Surface, walls: Walls, vertices: Bools, fraction: float | Floats, ways: Floats | None = None
 ) -> Surface:
-    """The whole surface with resting ``vertices`` raised along ``ways`` (n,3) by a fraction of their spacing.
+    """The whole surface with resting ``vertices`` raised by a fraction of their spacing, and their wall rows.
 
-    By default off Π. The rows below come up straight: bent as before, they could cost more than it gains.
+    ``ways`` are unit directions (n,3), by default off Π.
     """
     ways = walls.side[:, None] * np.array(surface.plane.normal) if ways is None else ways
-    spacing, rows = top_spacing(surface, walls), walls.rows
+    spacing = top_spacing(surface, walls)
     rise = fraction * np.where(vertices & np.isfinite(spacing), spacing, 0.0)
-    X, under = surface.vertices + rise[:, None] * ways, np.any(vertices[rows.top_ends], axis=1)
-    straight, below = replace(rows, offset=np.where(under[:, None], 0.0, rows.offset)), rows.vertices[under]
-    X[below] = place_wall_rows(surface, replace(walls, rows=straight), X)[below]
+    X = surface.vertices + rise[:, None] * ways
+    below = walls.rows.vertices[vertices[walls.rows.top_ends].any(axis=1)]
+    X[below] = place_wall_rows(surface, walls, X)[below]
     return surface.moved(X)
 
 

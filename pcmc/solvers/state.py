@@ -213,7 +213,11 @@ class SolverState:
         return True
 
     def lift_overpulled(self) -> bool:
-        """Lift resting vertices that are pulled harder than their walls can take, to the side of the pull."""
+        """Lift resting vertices that are pulled harder than their walls can take, to the side of the pull.
+
+        A wall that was lifted before comes up straight: as bent as it was, it could cost more than the pull
+        gains, and be brought down again without end.
+        """
         excess, resting = self.at.excess_pull, self.resting
         lifted = excess != 0.0
         if self._releases_left <= 0 or not lifted.any():
@@ -221,6 +225,9 @@ class SolverState:
         self._releases_left -= 1
         walls = replace(self.walls, side=np.where(excess < 0.0, -self.walls.side, self.walls.side))
         directions = pull_directions(self.at.shape, walls, resting, -self.at.gradient_with_reactions)
+        again, rows = lifted & (self._damping < 1.0), walls.rows
+        bent = ~again[rows.top_ends].any(axis=1)
+        walls = replace(walls, rows=replace(rows, offset=rows.offset * bent[:, None]))
         whole = lift(self.result_surface(), walls, lifted, LIFT * self._damping, directions)
         self._damping[lifted] *= DAMPING
         self._take(StandingPart.of(whole, walls, resting & ~lifted))

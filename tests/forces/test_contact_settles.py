@@ -6,6 +6,7 @@ from pcmc import Verdict, check_mesh, solve
 from pcmc.forces.pinching import standing_part
 from pcmc.meshing.remeshing import remesh
 from pcmc.plan import plan_from
+from studies.corners.ends import grid_case
 from tests.meshing.test_platforms import platform
 
 
@@ -29,3 +30,8 @@ def test_a_wall_that_is_lifted_off_a_curved_bottom_comes_up_straight():
     assert check.persists, check.detail
     stands = [one.walls.top_free & ~one.resting for one in map(standing_part, check.surfaces)]
     assert [mask.sum() for mask in stands] == [2, 4, 8]
+
+
+def test_a_wall_that_is_lifted_for_the_first_time_stays_bent():
+    """Straight at once, it comes down on its held bottom on the second of these meshes, and stays there."""
+    assert grid_case([5.0, 3.0, 2.0], "held")["label"] == "has a limit: a minimum"
