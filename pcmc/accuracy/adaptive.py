@@ -285,11 +285,9 @@ class _Search:
             status, detail = AccuracyStatus.STOPPED, ""
         if not self.rounds:
             return AccurateResult(status, first, None, pd.DataFrame(), pd.DataFrame(), (), detail)
-        last, rows = (
-            self.rounds[-1],
-            [r.values.assign(round=k, **r.record) for k, r in enumerate(self.rounds, 1)],
-        )
-        history, surfaces = pd.concat(rows, ignore_index=True), tuple(r.result.surface for r in self.rounds)
+        last, surfaces = self.rounds[-1], tuple(r.result.surface for r in self.rounds)
+        rows = [r.values.assign(round=k, **r.record) for k, r in enumerate(self.rounds, 1)]
+        history = pd.concat(rows, ignore_index=True)
         return AccurateResult(status, last.result, last.check, last.values, history, surfaces, detail)
 
     def _round(self, result: Result) -> _Round:

@@ -314,7 +314,7 @@ class _Search:
                 ends.append(end)
                 if one.index == 1:
                     self.ways.append(WayDown(number, to, end))
-        if any(ends) and (one.index > 1 or all(ends)):  # a barrier tells of the others
+        if any(ends) and (one.index > 1 or all(ends)):  # if one way of two leads on, a barrier has both
             lost = ", ".join(f"{end} ({ends.count(end)})" for end in sorted({*ends} - {""}))
             self.failed.append(f"The {len(ends)} ways down from a saddle of index {one.index}: {lost}.")
 

@@ -355,10 +355,8 @@ def with_rise(project: Project, wanted: Mapping[str, float | None]) -> Project:
         raise OptionError(f"{flag} and {others[0]}: give one of them, the other follows", what=flag)
     own = project.rises or (() if project.mesh is None else project.mesh.rises)
     if project.targets or own:
-        has = (
-            f"{own[0].kind} = {own[0].value:g} already; change it" if own else "targets already; change them"
-        )
-        raise OptionError(f"{flag}: {project.path.name} has {has} there", what=flag)
+        has, them = (f"{own[0].kind} = {own[0].value:g}", "it") if own else ("targets", "them")
+        raise OptionError(f"{flag}: {project.path.name} has {has} already; change {them} there", what=flag)
     if project.mesh is not None:
         if rises[0].kind not in RISES:
             raise OptionError(f"{flag}: is for a plan, and here is a mesh; give --rise or --apex", what=flag)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from cable_cases import hanging
 from nightly import at_night
+from programs import needs_evolver
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
@@ -212,7 +213,7 @@ def test_a_saddle_is_followed_until_it_has_more_ways_down():
     assert found.text().startswith("stays a saddle of index 1")
 
 
-@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@needs_evolver
 @pytest.mark.parametrize("build", [cap, *at_night(lambda: solve(two_caps(1.2), target="stationary").surface)])
 def test_surface_evolver_comes_to_rest_just_below_the_fold_and_runs_away_just_above(build):
     """On the same mesh, from the surface at the fold, by the program's own search along its Newton step."""

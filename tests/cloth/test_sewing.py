@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from programs import needs_ccx
 
 from generators import spherical_cap
 from pcmc import cutting_pattern, solve
 from pcmc.plan import Plan
-from pcmc.structure import calculix
 from pcmc.surface.geometry import face_areas
 from studies.questions.cloth import (
     EXTENSION,
@@ -43,7 +43,7 @@ def test_the_cloth_of_a_sewn_roof_carries_about_its_tension():
     assert np.linalg.eigvalsh(longer)[:, 1:].mean() == pytest.approx(pulls[:, 1:].mean() - less, rel=1e-3)
 
 
-@pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
+@needs_ccx
 def test_a_sewn_roof_comes_back_to_its_shape():
     surface, forces, _, stiffness = sewn(6)
     model = membrane(surface, stiffness)

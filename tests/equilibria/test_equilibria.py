@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import volume_cases
+from programs import needs_evolver
 from refusals import refused
 
 from generators import (
@@ -150,7 +151,7 @@ def test_enneper_s_surface_is_the_pass_between_two_that_are_images_of_each_other
     assert {barrier.to for barrier in found.barriers} == {1, 2}
 
 
-@pytest.mark.skipif(not evolver.available(), reason="Surface Evolver is not installed")
+@needs_evolver
 def test_two_unduloids_leave_the_cylinder_of_length_2_pi():
     """The index of the cylinder rises where L = 2πR; both lean back over shorter cylinders."""
     edge, length = 2.0 * np.pi / 14, 6.0
@@ -400,7 +401,7 @@ def test_minima_that_no_saddle_joins_are_named():
 
 
 def test_a_saddle_from_which_no_way_leads_to_a_minimum_is_named():
-    """A roof of two tops, of which either runs away, farther than its triangles can follow."""
+    """A roof with two summits: whichever grows, it inflates until the coarse triangles collapse."""
     X = [[-3, -1, 0], [0, -1, 0], [3, -1, 0], [3, 1, 0], [0, 1, 0], [-3, 1, 0], [-1, 0, 1], [1, 0, 1]]
     F = [[0, 1, 6], [1, 7, 6], [1, 2, 7], [2, 3, 7], [3, 4, 7], [4, 6, 7], [4, 5, 6], [5, 0, 6]]
     roof = Surface(X, F, [0] * 8, [Patch("roof", 0.39)], fixed=range(6))

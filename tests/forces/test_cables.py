@@ -8,6 +8,7 @@ import pytest
 from cable_cases import net
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from programs import needs_evolver
 from refusals import refused
 from shapes import rotation, three_patches
 
@@ -74,7 +75,7 @@ def test_evaluator_is_the_functional():
     np.testing.assert_allclose(point.gradient, pcmc.gradient(net()), atol=1e-14)
 
 
-@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@needs_evolver
 @pytest.mark.parametrize("name", TERMS)
 def test_the_reference_program_agrees(name):
     """Its forces of line tensions are those of the energy only where all patches have one pressure."""
@@ -351,7 +352,7 @@ def test_files_carry_cables_and_weights(tmp_path, suffix):
     assert pcmc.energy(again) == pytest.approx(pcmc.energy(surface), rel=1e-14)
 
 
-@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@needs_evolver
 def test_dumps_of_the_reference_program_are_read(tmp_path):
     evolver.run(net(), f'dump "{tmp_path / "net.dmp"}"')
     again = pcmc.read(tmp_path / "net.dmp")

@@ -8,6 +8,7 @@ import pytest
 from cable_cases import hanging, heavy_net
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from programs import needs_evolver
 from scipy.optimize import brentq
 
 from generators import (
@@ -268,7 +269,7 @@ def test_solve_raises_the_order_itself():
         solve(roof, order=5)
 
 
-@pytest.mark.skipif(not evolver.available(), reason="Surface Evolver is not installed")
+@needs_evolver
 def test_surface_evolver_has_the_same_energy_of_order_2():
     flat = solve(spherical_cap(0.25)).surface
     onto = (

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from programs import needs_evolver
 from tents import tent
 
 import pcmc
@@ -9,7 +10,7 @@ from generators import four_fans, two_caps, two_squares
 from pcmc.surface.supports import apply_supports
 from studies.reference import evolver
 
-pytestmark = pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+pytestmark = needs_evolver
 
 
 def shaken(surface: pcmc.Surface) -> pcmc.Surface:

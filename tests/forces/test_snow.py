@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from force_cases import HALL
 from nightly import at_night
+from programs import needs_evolver
 from refusals import refused
 from volume_cases import cap
 
@@ -119,7 +120,7 @@ def test_meshes_of_compas_carry_snow():
     assert [p.snow for p in from_meshes(to_meshes(hall())).patches] == [0.25, 0.5, -0.25]
 
 
-@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@needs_evolver
 def test_evolver_has_the_same_energy_under_snow_also_in_a_room(tmp_path):
     snowy = hall()
     assert evolver.energy(snowy) == pytest.approx(pcmc.energy(snowy), rel=1e-12)

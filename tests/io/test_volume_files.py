@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from programs import needs_evolver
 from volume_cases import cap, cylinder, raised
 
 import generators
@@ -64,7 +65,7 @@ def half_tent() -> Surface:
                    rooms=[Room("r", {"tent": 1}, 0.4)])  # fmt: skip
 
 
-@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@needs_evolver
 @pytest.mark.parametrize("name", ["bubbles", "raised roof", "cap", "plates", "beside a mirror"])
 def test_evolver_has_the_same_volumes_energy_and_gradient(name):
     bubbles = generators.double_bubble(0.8, volumes=(1.0, 0.7))
@@ -87,7 +88,7 @@ def test_evolver_has_the_same_volumes_energy_and_gradient(name):
     np.testing.assert_allclose(evolver.gradient(surface), forces, rtol=0, atol=1e-12 * abs(forces).max())
 
 
-@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@needs_evolver
 def test_evolver_stays_at_rest_where_we_do(tmp_path):
     surface = pcmc.solve(generators.double_bubble(0.6, volumes=(1.0, 0.7))).surface
     out = evolver.run(

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-import shutil
 from functools import partial
 from pathlib import Path
 
 import pytest
+from programs import needs_ccx
 
 import pcmc
 from pcmc.cli import main
@@ -97,7 +97,7 @@ def test_the_families_of_panels_and_the_theorem_of_the_roof(roof):
 
 
 @pytest.mark.nightly
-@pytest.mark.skipif(not shutil.which("ccx"), reason="ccx is not installed")
+@needs_ccx
 def test_how_far_the_hall_carries_a_drift_and_on_which_meshes():
     """The shares of the page under load, on four meshes; the table is that of the third."""
     script = (HOME / "docs" / "pictures" / "under_load.py").read_text(encoding="utf-8")

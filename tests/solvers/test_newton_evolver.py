@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 from nightly import at_night
+from programs import needs_evolver
 from starts import (
     bezier_hall,
     double_bubble,
@@ -22,7 +23,7 @@ from pcmc import solve
 from studies.reference import evolver
 
 pytestmark = [
-    pytest.mark.skipif(not evolver.available(), reason="evolver is not installed"),
+    needs_evolver,
     pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning"),
 ]
 WEAK = {"alpha_left": 4.0, "alpha_right": 4.0, "alpha_aux": 1.0, "depth": 5.0}

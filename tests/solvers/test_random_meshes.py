@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pytest
 from nightly import at_night
+from programs import needs_evolver
 from random_meshes import loaded_surface, random_surface
 
 import pcmc
@@ -98,7 +99,7 @@ def test_files_carry_random_forces(suffix, tmp_path):
     assert carried > 30
 
 
-@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@needs_evolver
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.FreeSurfaceWarning")
 def test_the_reference_program_has_the_energy_of_random_forces():
     compared = 0

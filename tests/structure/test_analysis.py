@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from programs import needs_ccx
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 from starts import spherical_cap
@@ -16,12 +17,10 @@ import pcmc
 from generators.grid import grid_faces
 from pcmc import Material, Patch, Plane, SelfWeight, Snow, Surface, Wind
 from pcmc.plan import Divider, Plan
-from pcmc.structure import analyse, analysis, calculix
+from pcmc.structure import analyse, analysis
 from pcmc.structure.loads import load_steps
 from pcmc.surface.geometry import area_vectors
 from pcmc.surface.pieces import to_space
-
-needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
 
 def disc(edge):

@@ -4,6 +4,7 @@ import re
 
 import pytest
 from printed import words_of
+from programs import needs_ccx
 from starts import spherical_cap
 from structures import model_of, pyramid
 from under_load import ALPHA
@@ -11,9 +12,6 @@ from under_load import ALPHA
 import pcmc
 from pcmc import cli
 from pcmc.structure import analyse, calculix
-
-needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
-
 
 PROJECT = """
 units = "m"

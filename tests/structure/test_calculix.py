@@ -6,6 +6,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 from nightly import at_night
+from programs import needs_ccx
 from refusals import refused
 from shapes import rotation
 from starts import four_fans, joined_caps, spherical_cap, stationary, two_squares
@@ -23,7 +24,7 @@ from studies.reference import kratos
 from tests.surface.test_circles import roofs
 from tests.surface.test_lines import squares
 
-pytestmark = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
+pytestmark = needs_ccx
 
 
 def flat_square(turn=None, **more):

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from programs import needs_ccx
 from refusals import refused
 from structures import model_of
 
@@ -16,7 +17,7 @@ from pcmc.base.units import Units
 from pcmc.plan import Plan, polyline
 from pcmc.report.chapters import at_rest_chapter, under_load_chapter
 from pcmc.report.tables import Table
-from pcmc.structure import Member, Profile, analyse, calculix
+from pcmc.structure import Member, Profile, analyse
 from pcmc.structure.columns import column_answers, column_table, column_text, columns_at_rest
 from pcmc.structure.member_forces import members_at_rest
 from pcmc.structure.section import members_of
@@ -129,7 +130,7 @@ def test_the_report_has_the_forces_of_columns_where_no_load_cases_were_run():
     assert list(at_rest_chapter(sail_on(), Units("m", "kN"))) == []
 
 
-@pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
+@needs_ccx
 def test_each_case_and_the_report_have_the_forces_of_columns():
     """By CalculiX at rest as by the certificate, and other ones under snow."""
     upright = sail_on(column([0, 0], [0, 0]), stay([0, 0], [-3, -3]))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from nightly import at_night
+from programs import needs_ccx
 from refusals import refused
 from scipy.linalg import eigh
 from scipy.optimize import brentq
@@ -19,11 +20,9 @@ from pcmc.base.units import Units
 from pcmc.forces.rooms import room_volume_gradients
 from pcmc.plan import Plan
 from pcmc.stability.equilibrium import Equilibrium
-from pcmc.structure import Gas, analyse, calculix
+from pcmc.structure import Gas, analyse
 from pcmc.structure.section import Structure
 from pcmc.surface.values import in_the_open
-
-needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
 
 @pytest.mark.nightly

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from programs import needs_ccx
 from refusals import refused
 
 import pcmc
@@ -16,10 +17,8 @@ from pcmc.base.errors import LostWarning, OptionError
 from pcmc.drawings.views import model_curves
 from pcmc.plan import Plan
 from pcmc.project.members import warn_of_members
-from pcmc.structure import analyse, calculix
+from pcmc.structure import analyse
 from pcmc.structure.section import Structure
-
-needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
 
 @cache

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hall_with_members import STEEL, TUBE, hall_with
 from nightly import at_night
+from programs import needs_ccx
 from starts import spherical_cap
 from structures import model_of, scaled, square
 
@@ -16,7 +17,7 @@ from pcmc import Circle, Material, SelfWeight, Snow
 from pcmc.base.units import Units
 from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import Plan, circle, polyline
-from pcmc.structure import Member, Profile, analyse, calculix
+from pcmc.structure import Member, Profile, analyse
 from pcmc.structure.frames import turns
 from pcmc.structure.inp import text_of
 from pcmc.structure.member_forces import (
@@ -24,8 +25,6 @@ from pcmc.structure.member_forces import (
     members_at_rest,
     weak_members,
 )
-
-needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
 
 def test_the_edge_of_a_flat_sheet_pulls_a_straight_beam_sideways():

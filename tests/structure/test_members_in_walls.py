@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from hall_with_members import STEEL, TUBE, hall, hall_under_load, hall_with
+from programs import needs_ccx
 from refusals import refused
 from small_project import HALL_WITH_ARCH
 from structures import model_of
@@ -14,14 +15,12 @@ from generators import joined_caps
 from pcmc import Material, Snow, StructuralModel, Wind, cli
 from pcmc.base.errors import OptionError
 from pcmc.plan import CableLine, Plan
-from pcmc.structure import Member, Profile, analyse, calculix
+from pcmc.structure import Member, Profile, analyse
 from pcmc.structure.frames import balancing_force, turns
 from pcmc.structure.member_forces import (
     forces_on_members,
     members_at_rest,
 )
-
-needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
 
 def test_the_junction_of_two_spheres_needs_no_bending():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hall_with_members import STEEL, TUBE, hall, hall_under_load, hall_with
+from programs import needs_ccx
 from refusals import refused
 from starts import spherical_cap
 from structures import FABRIC, model_of, scaled, square
@@ -16,15 +17,13 @@ from pcmc.plan import Plan, circle, polyline
 from pcmc.plot import member_forces
 from pcmc.report.chapters import under_load_chapter
 from pcmc.report.tables import Picture, Table
-from pcmc.structure import Member, Profile, analyse, calculix
+from pcmc.structure import Member, Profile, analyse
 from pcmc.structure.member_forces import (
     members_at_rest,
     sentences,
     weak_members,
 )
 from pcmc.structure.section import members_of
-
-needs_ccx = pytest.mark.skipif(not calculix.available(), reason="ccx is not installed")
 
 
 @needs_ccx

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from programs import needs_evolver
 
 from generators import spherical_cap_exact, two_squares
 from pcmc import hessian
@@ -100,7 +101,7 @@ def test_a_step_is_newtons():
         np.testing.assert_array_equal(step(), step())
 
 
-@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@needs_evolver
 def test_the_programs_faster_form_has_the_same_energy_and_steps():
     surface = two_squares(4, alpha_aux=1.0)
     for commands in ("", "g 5", "hessian_normal on\nhessian"):
@@ -152,7 +153,7 @@ def test_the_caps_height_is_extrapolated_at_its_orders():
     assert abs(richardson(heights, height.ORDERS) - exact) < height.ERROR
 
 
-@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@needs_evolver
 def test_the_programs_cap_follows_its_circle():
     exact = spherical_cap_exact().height
     for elements, order, close in (("linear", 2.0, 2e-3), ("quadratic", 3.2, 8e-6)):

@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+from programs import needs_evolver
 from refusals import refused
 
 import pcmc
@@ -142,7 +143,7 @@ def test_linearised_forces(case):
     assert np.abs(here(d) - numeric).max() < 1e-8
 
 
-@pytest.mark.skipif(not evolver.available(), reason="evolver is not installed")
+@needs_evolver
 @pytest.mark.parametrize("case", CASES)
 def test_evolver_agrees(case):
     """Energy and forces with constraints, the content of the flat pieces and the corners between them."""
