@@ -226,7 +226,8 @@ def _sources(acting: Forces) -> Iterator[tuple[Floats, list[_Part], tuple[Bools,
 
     chosen = acting.lines.all(axis=1) & ~topo.boundary_edge & at_both_ends(acting.clamped, topo.edges)
     along = np.where(acting.on_boundary[:, None], 0.0, acting.along)
-    yield along, [_line(surface, "line", c, ", inside") for c in topo.curves_among(chosen)], None
+    curves = topo.curves_among(chosen)
+    yield along, [_line(surface, "line", c, ", inside" * (len(set(c.sheets)) == 1)) for c in curves], None
 
     inside, standing = ~acting.clamped & ~acting.on_boundary, acting.standing
     at_rest = standing.on_ground | (acting.by_plane[0].any(axis=1) & ~acting.clamped)
