@@ -34,9 +34,9 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     midpoint is held where both ends are held *and* the edge is part of that support, as far as can be told:
 
     - boundary edge, both ends fixed: fixed;
-    - boundary edge, one end sliding and the other sliding, or fixed and on Π: sliding; the same for a junction
-      or seam edge that does not lead from boundary to boundary, and for each edge of a patch that lies on Π
-      and has sliding vertices off the boundary;
+    - boundary edge, one end sliding and the other sliding, or fixed and on Π: sliding; the same for a
+      junction or seam edge that does not lead from boundary to boundary, and for each edge of a patch that
+      lies on Π and has sliding vertices off the boundary;
     - junction or seam edge, both ends fixed, not leading from boundary to boundary: fixed;
     - edge inside a sheet, both ends fixed, off the boundary and on none of the curves (a held line in a
       patch): fixed; the same for the edge by which a line of two or more of them goes on to a fixed vertex
