@@ -221,7 +221,8 @@ def folded_over(surface: Surface, pinchable: Bools) -> str:
 
     Their normals turn by more than ``FOLDED`` at an edge that is neither held nor a cable's.
     """
-    topo, free = surface.topology, ~(surface.topology.seam_edge | surface.fixed[surface.topology.edges].all(1))
+    topo = surface.topology
+    free = ~(topo.seam_edge | surface.fixed[topo.edges].all(axis=1))
     free[topo.edge_numbers(surface.cable_edges.ends)] = False
     free[topo.edges_of(pinchable[surface.patch_of_face])] = False
     sides = topo.neighbours[free[topo.valence == 2]]
@@ -232,9 +233,12 @@ def folded_over(surface: Surface, pinchable: Bools) -> str:
     if not back.any():
         return ""
     face = sides[back.argmax(), 0] // 3
-    name, place = surface.patches[surface.patch_of_face[face]].name, surface.vertices[surface.faces[face]]
-    text = f"patch {name!r} is folded near {point_text(place.mean(axis=0), surface.size)}: a triangle lies on the"
-    return f"{text} back of another, so its area counts more than once; move the vertices there apart, or remesh"
+    name = surface.patches[surface.patch_of_face[face]].name
+    place = point_text(surface.vertices[surface.faces[face]].mean(axis=0), surface.size)
+    text = (
+        f"patch {name!r} is folded near {place}: a triangle lies on the back of another, so its area counts"
+    )
+    return f"{text} more than once; move the vertices there apart, or remesh"
 
 
 def _slips(surface: Surface, pinchable: Bools, place: Floats, reach: float) -> bool:

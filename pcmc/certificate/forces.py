@@ -283,8 +283,8 @@ def cable_ends(
     surface: Surface, X: Floats | None = None, tensions: Mapping[str, Floats] | None = None
 ) -> list[CableEnd]:
     """Each end of a part of a cable: the cable, the vertex, and the force -(τ + g z) t (3,) that holds it; or
-    with other positions X (n,3) and ``tensions`` (k,) of the edges of each cable, by name. t is the tangent at
-    the end: the direction of the last edge, which turns on by its share of the bend between the last two."""
+    with other positions X (n,3) and ``tensions`` (k,) of the edges of each cable, by name. t is the tangent
+    there: the last edge's direction turns on by its share of the bend between the last two edges."""
     found, X = [], surface.vertices if X is None else X
     for cable, curve in cable_parts(surface):
         for pair, pairs in zip(curve.ends, (curve.pairs[:2], curve.pairs[:-3:-1, ::-1]), strict=False):
