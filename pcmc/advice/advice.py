@@ -121,7 +121,7 @@ def improved(plan: Plan, certificate: Certificate) -> Plan:
     if grew or certificate.verdict in (Verdict.RAN_AWAY, Verdict.NONE_FOUND):
         plan = _stiffer(plan, certificate)
     # a ring that a cable alone holds is at rest at one radius, and stable at none
-    rings = [h for h in plan.holes if h.edge == "cable" and not h.cable_weight and not _supported(plan, h.curve)]
+    rings = [h for h in plan.holes if h.edge == "cable" and not (h.cable_weight or _supported(plan, h.curve))]
     if rings:
         holes = [replace(h, edge="fixed", cable=None) if h in rings else h for h in plan.holes]
         plan = replace(plan, holes=holes)

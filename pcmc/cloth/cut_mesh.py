@@ -309,7 +309,7 @@ def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet]) -> CutMesh:
     """The mesh cut along geodesics between the ends of each sheet's levels. Ends of several sheets meet, and
     those near a point in which cuts meet end there."""
     number = int(mesh.seam.max(initial=-1)) + 1
-    before = np.flatnonzero(np.bincount(mesh.cuts.ravel()) > 2).tolist()  # and vertices at ends of other sheets
+    before = np.flatnonzero(np.bincount(mesh.cuts.ravel()) > 2).tolist()  # and the ends in other sheets
     for sheet in sheets:
         meet, height = MEET * float(np.diff(sheet.levels).min()), mesh.X @ sheet.across
         own = [level_ends(mesh, sheet.source[mesh.source], height, level) for level in sheet.levels[1:-1]]

@@ -250,7 +250,8 @@ def _located(specs: Sequence[PatchSpec], mesh: PlanarMesh, centroid: Floats) -> 
     if len(bare):
         place = centroid[bare[0]]
         others = f" ({len(bare)} such parts)" if len(bare) > 1 else ""
-        problem = f"the part of the plan around {point_text(place)} has no patch{others}; add one with at= inside it"
+        problem = f"the part of the plan around {point_text(place)} has no patch{others}; add one with at="
+        problem += " inside it"
         raise PlanError(problem, what="patches", where=place.round(3).tolist())
     return owner
 
