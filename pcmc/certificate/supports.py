@@ -226,8 +226,9 @@ def _sources(acting: Forces) -> Iterator[tuple[Floats, list[_Part], tuple[Bools,
 
     chosen = acting.lines.all(axis=1) & ~topo.boundary_edge & at_both_ends(acting.clamped, topo.edges)
     along = np.where(acting.on_boundary[:, None], 0.0, acting.along)
-    curves = topo.curves_among(chosen)
-    yield along, [_line(surface, "line", c, ", inside" * (len(set(c.sheets)) == 1)) for c in curves], None
+    found = topo.curves_among(chosen)
+    within = [_line(surface, "line", c, "" if len({*c.sheets}) > 1 else ", inside") for c in found]
+    yield along, within, None
 
     inside, standing = ~acting.clamped & ~acting.on_boundary, acting.standing
     at_rest = standing.on_ground | (acting.by_plane[0].any(axis=1) & ~acting.clamped)
