@@ -25,6 +25,7 @@ from ..project import Project, surface_of
 from ..project.drawn import files_of
 from ..project.file import project_of, read_data
 from ..project.planning import project_text
+from ..project.settings import LISTS, SINGLE
 from ..project.values import data_with_values, differences
 from ..surface import Surface
 
@@ -202,7 +203,6 @@ class Watch:
 
 HELD = 1e-6  # relative misfit up to which a surface still meets a target
 FIELDS = ("quantity", "of", "value", "at_most", "at_least")
-OUTPUTS = {"files", "picture", "drawings", "panels", "structure", "report"}  # keys of [output] with names
 
 
 def save(
@@ -302,7 +302,7 @@ def project_with(
     old = project.path.stem
     if stem and stem != old:
         output: dict[str, Any] = data.get("output", {})
-        for key in OUTPUTS & output.keys():
+        for key in output.keys() & {*LISTS, *SINGLE}:
             given_one = isinstance(names := output[key], str)
             output[key] = _renamed(names, old, stem) if given_one else [_renamed(n, old, stem) for n in names]
     if found and given is None:
