@@ -178,7 +178,7 @@ def held_curves(surface: Surface) -> tuple[EdgeCurve, ...]:
 
 def _labelled(acting: Forces) -> Iterator[_Part]:
     """Each support with its forces and its number."""
-    count = dict.fromkeys("BSC", 0)
+    count: dict[str, int] = dict.fromkeys("BSC", 0)
     for forces, parts, rest in _sources(acting):
         sharing = np.zeros(len(forces))
         for part in parts:
