@@ -54,14 +54,15 @@ def hand_over(owner: Any, other: Any, *names: str) -> None:
     vars(other).update({name: vars(owner)[name] for name in names if name in vars(owner)})
 
 
-def cached_array(method: Callable[[Any], Array]) -> cached_property[Array]:
+class cached_array(cached_property[Array]):
     """``cached_property`` for an array, which can then no longer be written to."""
 
-    @wraps(method)
-    def computed(owner: Any) -> Array:
-        return read_only(method(owner))
+    def __init__(self, method: Callable[[Any], Array]) -> None:
+        @wraps(method)
+        def computed(owner: Any) -> Array:
+            return read_only(method(owner))
 
-    return cached_property(computed)
+        super().__init__(computed)
 
 
 def block_rows(blocks: Floats, corners: Ints, count: int) -> csr_array:

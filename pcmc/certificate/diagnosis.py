@@ -15,7 +15,7 @@ from ..base.tolerances import PINCHED
 from ..meshing.neighbour_swap import can_vanish, film_of
 from ..meshing.quality import edge_lengths, triangle_quality
 from ..surface import Surface
-from ..surface.geometry import face_areas, segment_lengths
+from ..surface.geometry import area_vectors, face_areas, segment_lengths
 from ..surface.pieces import point_text
 from ..surface.supports import members
 from ..surface.topology import EdgeCurve, components
@@ -151,6 +151,7 @@ SWAP = f"try pcmc solve FILE --swap {VANISHED}, or pcmc.swap_neighbours(surface)
 KEY = 'in a plan, bottom = "{}"'
 ALONG = 30.0  # degrees: at a smaller angle to the support a junction counts as lying along it
 ALIKE = 6  # decimals of a share: symmetric places differ by rounding
+FOLDED = 150.0  # degrees
 SLIPS = 0.25  # of the mode's largest motion: that much beside a fixed end is a slip of this end
 
 
@@ -212,6 +213,31 @@ def worst_face(surface: Surface, left_out: Bools) -> tuple[int, float]:
     quality = triangle_quality(surface.vertices, surface.faces)
     outer = np.where(left_out[surface.patch_of_face], np.inf, quality)
     return int(outer.argmin()), float(outer.min())
+
+
+def folded_over(surface: Surface, pinchable: Bools) -> str:
+    """Names a patch, not a wall that can pinch, with a triangle on the back of another; else empty.
+
+    Their normals turn by more than ``FOLDED`` at an edge that is neither held nor a cable's.
+    """
+    topo = surface.topology
+    free = ~(topo.seam_edge | surface.fixed[topo.edges].all(axis=1))
+    free[topo.edge_numbers(surface.cable_edges.ends)] = False
+    free[topo.edges_of(pinchable[surface.patch_of_face])] = False
+    sides = topo.neighbours[free[topo.valence == 2]]
+    one, other = area_vectors(surface.vertices[surface.faces])[sides.T // 3]
+    one[topo.one_way_edge[topo.edge_of_face.ravel()[sides[:, 0]]]] *= -1.0
+    sizes = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
+    back = np.einsum("ij,ij->i", one, other) < np.cos(np.radians(FOLDED)) * sizes
+    if not back.any():
+        return ""
+    face = sides[back.argmax(), 0] // 3
+    name = surface.patches[surface.patch_of_face[face]].name
+    place = point_text(surface.vertices[surface.faces[face]].mean(axis=0), surface.size)
+    text = (
+        f"patch {name!r} is folded near {place}: a triangle lies on the back of another, so its area counts"
+    )
+    return f"{text} more than once; move the vertices there apart, or remesh"
 
 
 def _slips(surface: Surface, pinchable: Bools, place: Floats, reach: float) -> bool:

@@ -177,7 +177,7 @@ def held_curves(surface: Surface) -> tuple[EdgeCurve, ...]:
 
 def _labelled(acting: Forces) -> Iterator[_Part]:
     """Each support with its forces and its number."""
-    count = dict.fromkeys("BSC", 0)
+    count: dict[str, int] = dict.fromkeys("BSC", 0)
     for forces, parts, rest in _sources(acting):
         sharing = np.zeros(len(forces))
         for part in parts:
@@ -225,7 +225,9 @@ def _sources(acting: Forces) -> Iterator[tuple[Floats, list[_Part], tuple[Bools,
 
     chosen = acting.lines.all(axis=1) & ~topo.boundary_edge & at_both_ends(acting.clamped, topo.edges)
     along = np.where(acting.on_boundary[:, None], 0.0, acting.along)
-    yield along, [_line(surface, "line", c, ", inside") for c in topo.curves_among(chosen)], None
+    found = topo.curves_among(chosen)
+    within = [_line(surface, "line", c, "" if len({*c.sheets}) > 1 else ", inside") for c in found]
+    yield along, within, None
 
     inside, standing = ~acting.clamped & ~acting.on_boundary, acting.standing
     at_rest = standing.on_ground | (acting.by_plane[0].any(axis=1) & ~acting.clamped)

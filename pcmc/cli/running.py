@@ -19,7 +19,7 @@ SHOWN = (errors.BalanceWarning, errors.FileWarning, errors.FreeSurfaceWarning, e
 FAILING = ("strict", "surrogateescape", "backslashreplace")  # error handlers; the second is the locale C's
 SIGNS = "²³±°×·≥≤–…→αλΠ"  # of the field
 TYPED = "^2|^3|+-| deg|x|*|>=|<=|-|...|->|alpha|lambda|Pi"  # each as one types it in ASCII
-PLAIN = str.maketrans(dict(zip(SIGNS, TYPED.split("|"), strict=True)))
+PLAIN = {ord(sign): typed for sign, typed in zip(SIGNS, TYPED.split("|"), strict=True)}
 
 
 def run_command(arguments: list[str]) -> int:

@@ -13,7 +13,7 @@ import pandas as pd
 from scipy.sparse import csr_array, vstack
 from scipy.sparse.linalg import splu
 
-from ..base.arrays import Floats, Ints, block_rows, cached_array, mask_of
+from ..base.arrays import Bools, Floats, Ints, block_rows, cached_array, mask_of
 from ..base.tolerances import ON
 from ..forces.triangles import effective_tensions
 from ..surface import Surface
@@ -35,7 +35,7 @@ class StripSides(NamedTuple):
 
     edge: Ints  # (b,) of the mesh
     ends: Ints  # (b,2) vertices of pieces, first the lower one in the mesh
-    forward: Ints  # (b,) whether the triangle runs along it so
+    forward: Bools  # (b,) whether the triangle runs along it so
     strip: Ints  # (b,)
 
 

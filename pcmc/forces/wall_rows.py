@@ -290,6 +290,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     for index in np.flatnonzero(surface.auxiliary).tolist():
         of_wall = topo.edges_of(surface.patch_of_face == index)
         edges, top = topo.edges[of_wall], topo.edges[of_wall[roof_edge[of_wall]]]
+        top = top[~surface.on_ground[top].all(axis=1)]  # what slides on Π has no height to lose
         if surface.on_ground[edges].any() and len(top):
             every.append((index, edges, top, None))
     none = np.empty((0, 2), dtype=np.int64)

@@ -241,10 +241,12 @@ def scaled_surface(surface: Surface, factor: float) -> Surface:
     """The surface in a new unit; ``factor`` new units are one old unit."""
     if factor == 1.0:
         return surface
-    parts = {f.name: in_new_unit(getattr(surface, f.name), factor) for f in fields(surface) if f.init}
-    supports = {name: in_new_unit(part, factor) for name, part in surface.given_supports._asdict().items()}
-    moved = {"vertices": factor * surface.vertices, "curves": in_new_unit(surface.held_curves, factor)}
-    return Surface(**parts | supports | moved)
+    parts: dict[str, Any] = {
+        f.name: in_new_unit(getattr(surface, f.name), factor) for f in fields(surface) if f.init
+    }
+    parts |= {name: in_new_unit(part, factor) for name, part in surface.given_supports._asdict().items()}
+    parts |= {"vertices": factor * surface.vertices, "curves": in_new_unit(surface.held_curves, factor)}
+    return Surface(**parts)
 
 
 def converted(data: MeshData, length: str, assumed: str = "") -> MeshData:

@@ -313,8 +313,9 @@ def reactions(
     lines, held = acting.per_length, acting.points.any(axis=1)
     if np.isnan(lines).all() and not held.any():
         raise OptionError("nothing holds the surface: no reactions to draw", what="surface")
-    labels = {"label": f"{units.tension} along lines", "points_label": f"{units.force or 'force'} at points"}
-    return vectors(surface, np.nan_to_num(lines), path, points=acting.points, **labels | options)
+    options = {"points_label": f"{units.force or 'force'} at points", **options}
+    options = {"label": f"{units.tension} along lines", **options}
+    return vectors(surface, np.nan_to_num(lines), path, points=acting.points, **options)
 
 
 def _print_numbers(axes: Any, surface: Surface, view: Camera, numbers: Floats, form: str) -> None:
