@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, mask_of
 from ..base.tolerances import ON
 from ..base.units import Units
 from ..forces.cables import directions, pull_along
@@ -71,7 +71,7 @@ def patch_table(surface: Surface, standing: Surface) -> pd.DataFrame:
     rows = []
     for index, patch in enumerate(surface.patches):
         faces = standing.patch_of_face == index
-        inside = np.isin(np.arange(surface.n), standing.faces[faces]) & np.isfinite(curvature)
+        inside = mask_of(standing.faces[faces], surface.n) & np.isfinite(curvature)
         varies = patch.weight and inside.any()
         mean = float(curvature[inside].mean()) if inside.any() else np.nan
         row: dict[str, Any] = {
