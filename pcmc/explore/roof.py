@@ -301,7 +301,7 @@ def project_with(
     data = data_with_values(project.path, data, surface, left)[0] | ({"targets": found} if found else {})
     old = project.path.stem
     if stem and stem != old:
-        output = data.get("output", {})
+        output: dict[str, Any] = data.get("output", {})
         for key in output.keys() & {*LISTS, *SINGLE}:
             given_one = isinstance(names := output[key], str)
             output[key] = _renamed(names, old, stem) if given_one else [_renamed(n, old, stem) for n in names]

@@ -113,7 +113,8 @@ def data_with_values(
             raise OptionError(f"{path.name} cannot hold the {labels} of the surface shown", what="values")
         tried.append(missing)
         if project.mesh is not None:
-            mesh = data["mesh"] = {"file": data["mesh"]} if isinstance(data["mesh"], str) else data["mesh"]
+            mesh: dict[str, Any] = {"file": data["mesh"]} if isinstance(data["mesh"], str) else data["mesh"]
+            data["mesh"] = mesh
             for (kind, name), value in missing.items():
                 if kind in KEYS:  # it holds no others
                     mesh.setdefault("patches", {}).setdefault(name, {})[KEYS[kind]] = _number(value)
