@@ -196,7 +196,8 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
     """(n,) the held bottom vertex below each top vertex of a wall, -1 elsewhere; None if they do not pair.
 
     As many steps along the top and along the bottom from each end of the wall make a pair. It ends where top
-    and bottom meet, and in planes that one vertex of each lies in; a closed one where they are nearest.
+    and bottom meet, and in planes that one vertex of each lies in. Of one without such ends the nearest pair
+    is taken: of the ends between which it hangs from other walls, or of the edges of a closed one.
     """
     n, tops, bottoms = surface.n, np.unique(top_edges), np.unique(bottom_edges)
     corners, count = np.intersect1d(tops, bottoms), len(tops)
@@ -207,11 +208,12 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
             ends.append(np.array(pair))
     if count != len(bottoms):
         return None
-    closed = len(top_edges) == len(bottom_edges) == count
-    if closed and sum(map(np.size, ends)) == 0:
-        ways, X = np.concatenate([bottom_edges, bottom_edges[:, ::-1]]), surface.vertices
-        apart, way = map(np.asarray, cKDTree(X[ways].reshape(-1, 6)).query(X[top_edges].reshape(-1, 6)))
-        ends = [np.array([top_edges[apart.argmin()], ways[way[apart.argmin()]]])]
+    if sum(map(np.size, ends)) == 0:
+        loose = [np.flatnonzero(np.bincount(edges.ravel()) == 1) for edges in (top_edges, bottom_edges)]
+        above, below = map(np.atleast_2d, loose) if min(map(len, loose)) == 2 else (top_edges, bottom_edges)
+        ways, X = np.concatenate([below, below[:, ::-1]]), surface.vertices
+        apart, way = map(np.asarray, cKDTree(X[ways].reshape(-1, 6)).query(X[above].reshape(-1, 6)))
+        ends = [np.array([above[apart.argmin()], ways[way[apart.argmin()]]])]
     top_ends, bottom_ends = np.concatenate(ends, axis=1)
     if not len(top_ends):
         return None

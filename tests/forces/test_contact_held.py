@@ -192,6 +192,17 @@ def test_strong_walls_that_cross_leave_a_roof_in_each_bay():
     assert "walls meet at resting vertex" in pcmc.verify(result.surface).reason
 
 
+def test_a_strong_wall_between_two_others_comes_down_too():
+    """No end of it is a corner, where top and bottom are one vertex."""
+    lines = [[4, 0], [4, 8]], [[8, 0], [8, 8]], [[4, 4], [8, 4]]
+    about = {"edge_length": 0.5, "tension": 2.0, "pressure": 0.4}
+    roof = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [Divider(line, wall=2.5) for line in lines], **about)
+    result = pcmc.solve(roof.surface())
+    assert result.certificate.verdict is Verdict.STABLE
+    bays = [pcmc.solve(Plan([[0, 0], [4, 0], [4, y], [0, y]], **about).surface()).energy for y in (4, 8)]
+    assert result.energy == pytest.approx(2.0 * sum(bays), rel=5e-4)
+
+
 def test_a_wall_that_stands_on_one_vertex_pulls_up_none_of_those_beside_it():
     """Its triangle spans from one resting vertex to the next, over the bottom that neither lifts with it."""
     cross = [Divider(line, wall=1.2) for line in ([[6, 0], [6, 8]], [[0, 4], [12, 4]])]
