@@ -141,9 +141,7 @@ def _steps(edges: Ints, goals: Ints, n: int, nearest: bool = False) -> Floats:
     return np.asarray(dijkstra(graph, indices=goals, **options))
 
 
-def held_walls(
-    surface: Surface, roof_edge: Bools, roof_vertex: Bools, low: Bools, all_of_them: bool
-) -> list[tuple[int, Ints, Ints, Ints]]:
+def held_walls(surface: Surface, roof_edge: Bools, all_of_them: bool) -> list[tuple[int, Ints, Ints, Ints]]:
     """Walls with a held bottom that can pinch: patch, edges, top edges, and the foot (n,) of each top vertex.
 
     These have one top edge to either side of each junction vertex, or end on another plane that it slides on,
@@ -151,7 +149,7 @@ def held_walls(
     """
     topo, X, rests = surface.topology, surface.vertices, all_of_them
     walls = list[tuple[int, Ints, Ints, Ints]]()
-    bottom = topo.boundary_edge & (surface.pinned & low)[topo.edges].all(axis=1)
+    bottom = topo.boundary_edge & surface.pinned[topo.edges].all(axis=1)
     meeting = np.zeros(surface.n, dtype=np.int64)  # the walls whose top edges have the vertex
     for index in np.flatnonzero(surface.auxiliary).tolist():
         of_wall = topo.edges_of(surface.patch_of_face == index)
@@ -160,8 +158,7 @@ def held_walls(
         meeting[np.unique(top)] += 1
         if not bottom[of_wall].any() or surface.on_ground[vertices].any():
             continue
-        below = vertices[surface.pinned[vertices] & ~roof_vertex[vertices]]
-        if not len(top) or not low[below].all():
+        if not len(top):
             continue
         foot = _held_feet(surface, top, topo.edges[of_wall[bottom[of_wall] & ~roof_edge[of_wall]]])
         if foot is None:
@@ -235,7 +232,7 @@ class Walls:
     top_edges: Ints  # (k,2)
     wall_below: Ints  # (k,) the patch of the wall below each of them
     top_free: Bools  # (n,) free vertices of top edges: these can come to rest on Π
-    corner: Bools  # (n,) fixed vertices of top edges on Π, where a wall ends
+    corner: Bools  # (n,) fixed vertices of top edges on Π or the bottom, where a wall ends
     side: Floats  # (n,) +1 or -1, the side of Π a vertex is on; on Π, the side the pressure pushes it to
     pinchable: Bools  # (patches,) the patches that are such walls
     foot: Ints  # (n,) for vertices of top edges the vertex below it on a held bottom; -1 elsewhere
@@ -298,7 +295,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
             every.append((index, edges, top, None))
     none = np.empty((0, 2), dtype=np.int64)
     sliding = np.concatenate([none, *(top for _, _, top, _ in every)])
-    for index, edges, top, feet in held_walls(surface, roof_edge, roof_vertex, low, held):
+    for index, edges, top, feet in held_walls(surface, roof_edge, held):
         if not np.isin(top, sliding).any():
             foot = np.where(feet >= 0, feet, foot)
             every.append((index, edges, top, feet))
@@ -322,7 +319,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
         top_edges=top_edges,
         wall_below=below,
         top_free=on_top & ~surface.pinned & ~surface.on_ground,
-        corner=on_top & surface.pinned & low,
+        corner=on_top & surface.pinned & (low | (foot == np.arange(n))),
         side=np.where(np.where(low, push, height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,
         foot=foot,
