@@ -92,7 +92,8 @@ def _sides(lengths: Sequence[int]) -> Ints:
     """(k,2) numbers of the ends of every side of closed polygons stored one after the other."""
     start = np.repeat(np.cumsum(lengths) - lengths, lengths)
     number = np.arange(sum(lengths))
-    return np.stack([number, start + (number - start + 1) % np.repeat(lengths, lengths)], axis=1)
+    after = start + (number - start + 1) % np.repeat(lengths, lengths)
+    return np.stack([number, after], axis=1, dtype=np.int64)
 
 
 def _lattice(rim: Floats, spacing: float) -> Floats:

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from pcmc.base.arrays import Floats
 
-Complexes = npt.NDArray[np.complex128]
+Complexes = npt.NDArray[np.inexact]
 STEPS = 12  # of Gauss and Newton's iteration
 LONGEST = 0.02  # of a step in the parameter
 

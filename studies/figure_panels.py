@@ -77,7 +77,7 @@ def eigenvalue_panels(panels: Mapping[str, Curves], path: Path) -> None:
     figure = new(1500, 370.0 * math.ceil(len(panels) / columns) + 60.0, pad=8.0)
     axes = grid(figure, len(panels), columns, sharex=True)
     labels = list(dict.fromkeys(label for curves in panels.values() for label in curves))
-    looks = {
+    looks: dict[str, dict[str, Any]] = {
         label: {"color": CURVES[k], "marker": "os"[k % 2], "markersize": 2.6, "linewidth": 1.0}
         for k, label in enumerate(labels)
     }

@@ -42,7 +42,7 @@ def jump_table(results: Path) -> list[str]:
 def comparison_cells(comparison: pd.DataFrame, kind: str) -> list[list[str]]:
     """A row of words for each claim of a kind."""
     cells = []
-    shown = comparison.assign(**comparison[["chosen", "threshold"]].fillna(""))
+    shown = comparison.fillna({"chosen": "", "threshold": ""})
     for row in shown[shown.kind == kind].to_dict("records"):
         equal = row["relation"] == "="
         paper = f"{'' if equal else row['relation'] + ' '}{row['paper']:.7g}"

@@ -54,14 +54,15 @@ def hand_over(owner: Any, other: Any, *names: str) -> None:
     vars(other).update({name: vars(owner)[name] for name in names if name in vars(owner)})
 
 
-def cached_array(method: Callable[[Any], Array]) -> cached_property[Array]:
+class cached_array(cached_property[Array]):
     """``cached_property`` for an array, which can then no longer be written to."""
 
-    @wraps(method)
-    def computed(owner: Any) -> Array:
-        return read_only(method(owner))
+    def __init__(self, method: Callable[[Any], Array]) -> None:
+        @wraps(method)
+        def computed(owner: Any) -> Array:
+            return read_only(method(owner))
 
-    return cached_property(computed)
+        super().__init__(computed)
 
 
 def block_rows(blocks: Floats, corners: Ints, count: int) -> csr_array:
@@ -84,9 +85,18 @@ def distinct(numbers: Ints, count: int) -> Ints:
     >>> distinct(np.array([[4, 1], [1, 4]]), 5).tolist()
     [1, 4]
     """
-    occurs = np.zeros(count, dtype=bool)
-    occurs[numbers] = True
-    return np.flatnonzero(occurs)
+    return np.flatnonzero(mask_of(numbers, count))
+
+
+def mask_of(numbers: Ints | list[int], count: int) -> Bools:
+    """(count,) whether each number from 0 to count - 1 is among these.
+
+    >>> mask_of(np.array([[3, 1], [1, 3]]), 5).tolist()
+    [False, True, False, True, False]
+    """
+    mask = np.zeros(count, dtype=bool)
+    mask[numbers] = True
+    return mask
 
 
 def format_rows(template: str, *columns: npt.NDArray[Any]) -> str:

@@ -10,12 +10,12 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.tolerances import PINCHED
 from ..meshing.neighbour_swap import can_vanish, film_of
 from ..meshing.quality import edge_lengths, triangle_quality
 from ..surface import Surface
-from ..surface.geometry import face_areas, segment_lengths
+from ..surface.geometry import area_vectors, face_areas, segment_lengths
 from ..surface.pieces import point_text
 from ..surface.supports import members
 from ..surface.topology import EdgeCurve, components
@@ -83,7 +83,7 @@ def held_groups(surface: Surface) -> tuple[Ints, Floats]:
     topo, n = surface.topology, surface.n
     edges = topo.edges[held_boundary(surface)]
     label = components(edges, n)
-    on_curve = np.isin(np.arange(n), edges)
+    on_curve = mask_of(edges, n)
     curves, first = np.unique(label[on_curve], return_index=True)
     part = topo.components[np.flatnonzero(on_curve)[first]]
     several = curves[np.bincount(part)[part] > 1] if len(part) else curves
@@ -139,8 +139,7 @@ def _minimal_cut(edge_of_face: Ints, inner: Ints, lengths: Floats, starts: Ints,
     graph = csr_array(coo_array((data.astype(np.int32), (row, column)), shape=(sink + 1, sink + 1)))
     left = (graph - csr_array(maximum_flow(graph, source, sink).flow)).astype(float)
     left.eliminate_zeros()
-    reached = np.zeros(sink + 1, dtype=bool)
-    reached[breadth_first_order(left, source, return_predecessors=False)] = True
+    reached = mask_of(breadth_first_order(left, source, return_predecessors=False), sink + 1)
     return np.asarray(reached[m : m + k] & ~reached[m + k : m + 2 * k])
 
 
@@ -152,6 +151,7 @@ SWAP = f"try pcmc solve FILE --swap {VANISHED}, or pcmc.swap_neighbours(surface)
 KEY = 'in a plan, bottom = "{}"'
 ALONG = 30.0  # degrees: at a smaller angle to the support a junction counts as lying along it
 ALIKE = 6  # decimals of a share: symmetric places differ by rounding
+FOLDED = 150.0  # degrees
 SLIPS = 0.25  # of the mode's largest motion: that much beside a fixed end is a slip of this end
 
 
@@ -199,7 +199,7 @@ def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
     Without a bottom vertex below each junction vertex such a wall cannot pinch: its triangles collapse.
     """
     X, patch = surface.vertices, int(surface.patch_of_face[worst_face(surface, pinchable)[0]])
-    used = np.isin(np.arange(surface.n), surface.faces[surface.patch_of_face == patch])
+    used = mask_of(surface.faces[surface.patch_of_face == patch], surface.n)
     top = used & surface.topology.on_junction
     bottom, top = used & surface.pinned & ~top, top & ~surface.pinned
     if not (surface.auxiliary[patch] and top.any() and bottom.any()):
@@ -213,6 +213,31 @@ def worst_face(surface: Surface, left_out: Bools) -> tuple[int, float]:
     quality = triangle_quality(surface.vertices, surface.faces)
     outer = np.where(left_out[surface.patch_of_face], np.inf, quality)
     return int(outer.argmin()), float(outer.min())
+
+
+def folded_over(surface: Surface, pinchable: Bools) -> str:
+    """Names a patch, not a wall that can pinch, with a triangle on the back of another; else empty.
+
+    Their normals turn by more than ``FOLDED`` at an edge that is neither held nor a cable's.
+    """
+    topo = surface.topology
+    free = ~(topo.seam_edge | surface.fixed[topo.edges].all(axis=1))
+    free[topo.edge_numbers(surface.cable_edges.ends)] = False
+    free[topo.edges_of(pinchable[surface.patch_of_face])] = False
+    sides = topo.neighbours[free[topo.valence == 2]]
+    one, other = area_vectors(surface.vertices[surface.faces])[sides.T // 3]
+    one[topo.one_way_edge[topo.edge_of_face.ravel()[sides[:, 0]]]] *= -1.0
+    sizes = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
+    back = np.einsum("ij,ij->i", one, other) < np.cos(np.radians(FOLDED)) * sizes
+    if not back.any():
+        return ""
+    face = sides[back.argmax(), 0] // 3
+    name = surface.patches[surface.patch_of_face[face]].name
+    place = point_text(surface.vertices[surface.faces[face]].mean(axis=0), surface.size)
+    text = (
+        f"patch {name!r} is folded near {place}: a triangle lies on the back of another, so its area counts"
+    )
+    return f"{text} more than once; move the vertices there apart, or remesh"
 
 
 def _slips(surface: Surface, pinchable: Bools, place: Floats, reach: float) -> bool:

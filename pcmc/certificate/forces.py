@@ -283,14 +283,17 @@ def cable_ends(
     surface: Surface, X: Floats | None = None, tensions: Mapping[str, Floats] | None = None
 ) -> list[CableEnd]:
     """Each end of a part of a cable: the cable, the vertex, and the force -(τ + g z) t (3,) that holds it; or
-    with other positions X (n,3) and ``tensions`` (k,) of the edges of each cable, by name."""
+    with other positions X (n,3) and ``tensions`` (k,) of the edges of each cable, by name. t is the tangent
+    there: the last edge's direction turns on by its share of the bend between the last two edges."""
     found, X = [], surface.vertices if X is None else X
     for cable, curve in cable_parts(surface):
-        for pair in curve.ends:
+        for pair, pairs in zip(curve.ends, (curve.pairs[:2], curve.pairs[:-3:-1, ::-1]), strict=False):
             pull = pull_along(surface, cable, pair[:1])
             if tensions is not None:
                 pull = tensions[cable.name][(np.sort(cable.edges, axis=1) == np.sort(pair)).all(axis=1)]
-            found.append((cable, int(pair[0]), -pull * directions(X, pair[None])[0][0]))
+            t, length = directions(X, pairs)
+            tangent = t[0] + (t[0] - t[-1]) * length[0] / length.sum()
+            found.append((cable, int(pair[0]), -pull * tangent / np.linalg.norm(tangent)))
     return found
 
 

@@ -18,7 +18,7 @@ from ..surface import Surface
 from ..surface.pieces import point_text
 from .balance import coarseness, growing_part, hardly_balanced, overload, unbalanced, unheld
 from .cables import too_long, weak_cable
-from .diagnosis import Neck, describe_saddle, held_wall_down, pinched_neck, where_collapsed
+from .diagnosis import Neck, describe_saddle, folded_over, held_wall_down, pinched_neck, where_collapsed
 from .proof import Attempt, Overload, Proof
 
 NO_TENSION = "no patch has a tension: every shape is at rest"
@@ -39,7 +39,7 @@ class Verdict(Enum):
     RAN_AWAY = "ran away from this start: another start may come to rest; nothing proves that none does"
     UNDECIDED = "undecided: rounding hides whether it is at rest, or stable; the detail has the reason"
     WALL_DOWN = "wall down: a junction comes down on the held bottom of its wall, where it cannot rest"
-    DEGENERATE = "degenerate mesh: triangles have collapsed; remesh, or start from another shape"
+    DEGENERATE = "degenerate mesh: triangles have collapsed, or are folded; remesh, or start elsewhere"
 
 
 class Evidence(Enum):
@@ -113,6 +113,11 @@ class Findings:
     def neck(self) -> Neck | None:
         """The neck that pinches off, if triangles have collapsed there."""
         return pinched_neck(self.surface) if self.moving and self.collapsed else None
+
+    @cached_property
+    def folded(self) -> str:
+        """Names a patch that is folded over, else empty: its area counts more than once there."""
+        return folded_over(self.surface, self.pinchable)
 
     @property
     def collapsed(self) -> bool:
@@ -253,6 +258,7 @@ RULES: tuple[tuple[Verdict, Callable[[Findings], object], Callable[[Findings], s
     (Verdict.UNDECIDED, lambda f: f.moving and f.residual <= NOISE * f.rounding, _hidden_forces),
     (Verdict.NOT_CONVERGED, lambda f: f.moving, _forces_left),
     (Verdict.NOT_CONVERGED, lambda f: f.own_residuals.max() > WEAK * f.tolerance, _weak_patch),
+    (Verdict.DEGENERATE, lambda f: f.folded, lambda f: f.folded),
     (Verdict.SADDLE, lambda f: (heavy_triangle_pulls(f.surface) <= 0.0).any(), _compressed),
     (Verdict.SADDLE, lambda f: (heavy_cable_pulls(f.surface) <= 0.0).any(), _compressed),
     (Verdict.UNDECIDED, lambda f: f.spectrum.unknown, _hidden_stability),

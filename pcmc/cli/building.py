@@ -34,6 +34,7 @@ from .reports import working
 CSV = ".csv"
 FAMILY = "Largest difference of edges within a family of triangles."
 PATTERN = "planar-quads along lines of curvature; quads or hexagons of a grid in plan."
+GRID = "Direction of a grid in plan, from x; by default the project's, or 0."
 CHANGE = "Move the vertices along the shape to lower the number of families; leave the shape by at most this."
 COST = "Cost of a family, as of its mould, and of a panel; adds NAME-costs.csv and .svg. Needs --change."
 ALIKE = "Largest difference of edges within a family of panels; adds the schedule. By default the project's."
@@ -58,7 +59,7 @@ def panels_(
     view: ViewName = "diagonal",
     pattern: Annotated[str | None, option("NAME", PATTERN)] = None,
     size: Annotated[float | None, amount("LENGTH", "Edge of the panels of a pattern.")] = None,
-    direction: Annotated[float, amount("DEGREES", "Direction of a grid in plan, from x.")] = 0.0,
+    direction: Annotated[float | None, amount("DEGREES", GRID)] = None,
     units: FileUnits = "",
     sheet: SheetFormat = None,
     change: Annotated[float | None, amount("LENGTH", CHANGE)] = None,
@@ -84,7 +85,7 @@ def panels_(
     seen, files = arguments.parsed_view(view, picture), output or []
     triangles = {"tolerance": tolerance, "change": change, "cost": cost, "walls": walls or None}
     triangles["mirror-images"] = mirror_images if mirror_images != "alike" else None
-    nets = {"units": units or None, "direction": direction or None, "sheet": sheet}
+    nets = {"units": units or None, "direction": direction, "sheet": sheet}
     net = pattern is not None or size is not None
     for name in (name for name, value in (triangles if net else nets).items() if value is not None):
         mend = "triangles; leave it out, or" if net else "quads and hexagons; leave it out, or give"
@@ -151,17 +152,20 @@ def _net(
     seen: Any,
     sheet: str | None,
     build: Build,
-    wanted: tuple[float, str, float],
+    wanted: tuple[float, str, float | None],
 ) -> int:
     for path in files:
         suffix_of(path, NET_SUFFIXES, "a net of panels")
-    size, pattern, direction = wanted
-    check_grid(pattern, direction)
+    size, pattern, given = wanted
+    check_grid(pattern, given or 0.0)
     outputs = Output(picture=picture, view=seen, sheet=sheet or "A1").paths
     outputs += [one for path in files for one in table_paths(path, NET_TABLES)]
     check_outputs(outputs, inputs=files_of(file), pictures=[picture])
     with working() as progress:
-        roof = build.roof(arguments.load_project(file, units), progress)
+        project = arguments.load_project(file, units)
+        own = given is None and pattern != "planar-quads"
+        direction = project.output.net_direction if own else given or 0.0
+        roof = build.roof(project, progress)
         progress("laying out panels")
         net = roof.panel_net(size, pattern, direction, build.allow_uncertified)
         works: list[Any] = net_files(net, files, roof.units, sheet or roof.output.sheet, roof.name, roof.mark)
@@ -290,12 +294,22 @@ def structure(
         project = arguments.load_project(file)
         start = projects.surface_of(project)
         patches = [patch.name for patch in start.patches]
-        thick = arguments.by_name(patches, given.thickness, "--thickness")
-        even = set(thick) == set(patches) and len(set(thick.values())) == 1  # one number, not one by patch
         values: dict[str, Any] = {} if project.structure is None else asdict(project.structure)
-        values |= {name: value for name, value in vars(given).items() if value not in (None, [])}
-        values |= {"thickness": thick[patches[0]] if even else thick} if thick else {}
-        values |= {"wind": arguments.by_name(patches, given.wind, "--wind")} if given.wind else {}
+        plain = {k: v for k, v in vars(given).items() if k not in ("thickness", "wind") and v is not None}
+        values |= plain
+        if given.thickness:
+            thick = arguments.by_name(patches, given.thickness, "--thickness")
+            if project.structure is not None:
+                own = project.structure.thicknesses(start)
+                thick = (own if isinstance(own, dict) else dict.fromkeys(patches, own)) | thick
+                tables = values["patches"].items()  # their own would count for more
+                values["patches"] = {k: {**table, "thickness": thick[k]} for k, table in tables}
+            even = (
+                set(thick) == set(patches) and len(set(thick.values())) == 1
+            )  # one number, not one by patch
+            values["thickness"] = thick[patches[0]] if even else thick
+        if given.wind:
+            values["wind"] = values.get("wind", {}) | arguments.by_name(patches, given.wind, "--wind")
         wanted = Structure(**values)
         wanted.check(start, project.plan, build.whole or project.output.whole)
         if run := wanted.run if run is None else run:

@@ -19,13 +19,12 @@ SHOWN = (errors.BalanceWarning, errors.FileWarning, errors.FreeSurfaceWarning, e
 FAILING = ("strict", "surrogateescape", "backslashreplace")  # error handlers; the second is the locale C's
 SIGNS = "²³±°×·≥≤–…→αλΠ"  # of the field
 TYPED = "^2|^3|+-| deg|x|*|>=|<=|-|...|->|alpha|lambda|Pi"  # each as one types it in ASCII
-PLAIN = str.maketrans(dict(zip(SIGNS, TYPED.split("|"), strict=True)))
+PLAIN = {ord(sign): typed for sign, typed in zip(SIGNS, TYPED.split("|"), strict=True)}
 
 
 def run_command(arguments: list[str]) -> int:
     """Run the command; an error becomes one line on stderr; return the exit code."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):
         for kind in SHOWN:
             warnings.simplefilter("always", kind)
         warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")

@@ -117,7 +117,7 @@ class CuttingOptions:
             try:
                 points = np.asarray(line, dtype=float)
             except (TypeError, ValueError):
-                points = np.empty(0)
+                points = np.empty((0, 0))
             good = points.ndim == 2 and len(points) > 1 and points.shape[1] in (2, 3)
             if not (good and np.isfinite(points).all()):
                 validate.refuse("seams", line, expected, str(number), "such as [[0, 0], [4, 2]]")

@@ -126,7 +126,7 @@ def read_vertices(named: Mapping[str, Any], whole: WholeMesh) -> tuple[list[Vert
         if lost := used - set(mesh.vertex):
             _refuse("faces", name, f"a face names vertex {min(lost)}, which the mesh does not have")
         unused += len(mesh.vertex) - len(used)
-        for key in filter(used.__contains__, mesh.vertex):
+        for key in (key for key in mesh.vertex if key in used):
             row = mesh.default_vertex_attributes | mesh.vertex[key]
             support = FIXED if any(map(row.get, HELD)) else SLIDING if row.get(SLIDES) else FREE
             marked |= any(mark in row for mark in (SLIDES, *HELD))

@@ -225,7 +225,7 @@ class Search:
         hint = reason or "raise the tensions that do not vary, or the bounds of those that do"
         raise NoStart(f"meet: no equilibrium was found to start from: {hint}", what="surface")
 
-    def solve_from(self, start: Surface, x: Floats, **quality: float) -> Trial | None:
+    def solve_from(self, start: Surface, x: Floats, **quality: Any) -> Trial | None:
         """Solve once, from a surface, unless its boundary cannot carry the load.
 
         None where no equilibrium is found, or where it is at a fold and has no derivatives.

@@ -312,7 +312,7 @@ def net_drawings(
     nodes = [(at, str(k), "PCMC-POINT") for k, at in enumerate(net.points[:, :2], start=1)]
     plan = views.DrawnView("", lines, numbers, nodes, stations=(ends[0], ends[1]))
     sheets = [views.placed([plan], "Panels and nodes in plan", sheet, millimetres, None, decimals)]
-    tables = [
+    tables: list[tuple[str, pd.DataFrame, dict[str, str]]] = [
         ("Nodes", net.nodes[["node", *"xyz", "kind"]], dict.fromkeys("xyz", length)),
         ("Panels", net.panels[["panel", "patch", "kind", "corners", "area"]], {"area": f"{length}²"}),
     ]

@@ -185,7 +185,7 @@ class Equilibria:
             half += " (--whole, or the surface that pcmc.mirrored unfolds, has them)."
         given = "The search was stopped before its end." if self.stopped else ""
         words = [*self.barrier_lines(units), *self.searched, *_grouped(self.failed), given, half, INCOMPLETE]
-        return "\n".join(filter(None, [units.sentence if units else "", rows, *words]))
+        return "\n".join(line for line in (units.sentence if units else "", rows, *words) if line)
 
     def barrier_lines(self, units: Units = NO_UNITS) -> list[str]:
         """A line for each barrier: from where, over which saddle, to where, its energy; last the unknown."""

@@ -193,7 +193,7 @@ class PageHandler(BaseHTTPRequestHandler):
 
     def _send_file(self, name: str) -> None:
         kind = MEDIA.get(Path(name).suffix)
-        file = files(__package__).joinpath("page", name)
+        file = files(str(__package__)).joinpath("page", name)
         if kind is None or not re.fullmatch(r"[\w.-]{1,80}", name) or not file.is_file():
             raise RequestError(f"there is no file {name!r:.60}", HTTPStatus.NOT_FOUND)
         self._send(file.read_bytes(), f"{kind}; charset=utf-8")

@@ -25,6 +25,7 @@ from ..project import Project, surface_of
 from ..project.drawn import files_of
 from ..project.file import project_of, read_data
 from ..project.planning import project_text
+from ..project.settings import LISTS, SINGLE
 from ..project.values import data_with_values, differences
 from ..surface import Surface
 
@@ -202,7 +203,6 @@ class Watch:
 
 HELD = 1e-6  # relative misfit up to which a surface still meets a target
 FIELDS = ("quantity", "of", "value", "at_most", "at_least")
-OUTPUTS = {"files", "picture", "drawings", "panels", "structure", "report"}  # keys of [output] with names
 
 
 def save(
@@ -301,8 +301,8 @@ def project_with(
     data = data_with_values(project.path, data, surface, left)[0] | ({"targets": found} if found else {})
     old = project.path.stem
     if stem and stem != old:
-        output = data.get("output", {})
-        for key in OUTPUTS & output.keys():
+        output: dict[str, Any] = data.get("output", {})
+        for key in output.keys() & {*LISTS, *SINGLE}:
             given_one = isinstance(names := output[key], str)
             output[key] = _renamed(names, old, stem) if given_one else [_renamed(n, old, stem) for n in names]
     if found and given is None:

@@ -95,7 +95,7 @@ def pressure_shares(surface: Surface) -> Floats:
     """
     signs = surface.room_signs * surface.roof
     whole = not surface.rooms or np.linalg.matrix_rank(signs) == len(signs)  # numpy 2.1 refuses no rows
-    return np.asarray(np.linalg.pinv((signs if whole else surface.room_signs).T))
+    return np.asarray(np.linalg.pinv((signs if whole else surface.room_signs).T), dtype=np.float64)
 
 
 def energy_at_volumes(surface: Surface) -> float:

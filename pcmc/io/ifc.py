@@ -47,7 +47,7 @@ FINDINGS = {  # in the property set of the certificate, by the name there
     "LoadRatio": ("IfcReal", "load_ratio"),
     "LowestEigenvalue": ("IfcReal", "lowest_eigenvalue"),
 }
-TYPES = {"IfcText": str, "IfcLabel": str, "IfcInteger": int, "IfcReal": float}
+TYPES: dict[str, Any] = {"IfcText": str, "IfcLabel": str, "IfcInteger": int, "IfcReal": float}
 Properties = Mapping[str, tuple[str, Any]]  # by name, the type and value
 
 
@@ -295,7 +295,7 @@ def _findings(certificate: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
         value = values.get(key)
         if name == "Verdict" and value is not None:
             found[name] = kind, str(getattr(value, "name", value)).lower()
-        elif np.isfinite(real(value)) if kind == "IfcReal" else value not in (None, ""):
+        elif value not in (None, "") and (kind != "IfcReal" or np.isfinite(real(value))):
             found[name] = kind, TYPES[kind](value)
     return found
 

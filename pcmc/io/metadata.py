@@ -104,8 +104,8 @@ class Metadata:
         found, changed = names_from_file(names)
         patches = tuple(self.patches.get(name) or Patch(found[name], 1.0) for name in names)
         bare = tuple(found[name] for name in names if self.patches.get(name) is None)
-        about = {"bare": bare, "plane": self.plane, "units": self.units, "parts": self.parts} | more
-        return MeshData(X, F, patch, patches, notes=(*notes, *filter(None, (changed,))), **about)
+        about: dict[str, Any] = {"bare": bare, "plane": self.plane, "units": self.units, "parts": self.parts}
+        return MeshData(X, F, patch, patches, notes=(*notes, *filter(None, (changed,))), **about | more)
 
     def of_meshes(self, meshes: Iterable[tuple[str, Any, Any]], default: str = "", **more: Any) -> MeshData:
         """Meshes of a name, points (n,3) and triangles (m,3) each; those of one name are one patch.

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..base.errors import FileError, PcmcError
+from ..base.errors import FileError
 from ..base.libraries import translated_errors
 from ..surface import HeldCurve, Surface
 from .formats import PARTS, Content
@@ -88,7 +88,7 @@ def _curves(rows: Any, n: int) -> tuple[HeldCurve, ...]:
         for one in map(HeldCurve.from_plain, rows):
             V = within(numeric(one.vertices, "vertices", "iu", (None,)), "vertices", n)
             curves.append(replace(one, vertices=V))
-    except (*DAMAGED, PcmcError) as error:
+    except DAMAGED as error:
         text = f"curve {len(curves)} is damaged: {error}"
         raise FileError(text, what="curves", where=len(curves)) from None
     return tuple(curves)

@@ -184,4 +184,5 @@ def _rows(element: _Element, data: bytes, start: int) -> tuple[dict[str, Any], i
     for number in range(element.size):  # each row says only where the next one starts
         rows.append(row_at(start, number))
         start += rows[-1].nbytes
-    return {name: np.concatenate([one[name].ravel() for one in rows]) for name in first.dtype.names}, start
+    names = first.dtype.names or ()
+    return {name: np.concatenate([one[name].ravel() for one in rows]) for name in names}, start

@@ -34,7 +34,9 @@ def refine(surface: Surface, levels: int = 1, project: Projection | None = None)
     midpoint is held where both ends are held *and* the edge is part of that support, as far as can be told:
 
     - boundary edge, both ends fixed: fixed;
-    - boundary edge, one end sliding and the other sliding, or fixed and on Π: sliding;
+    - boundary edge, one end sliding and the other sliding, or fixed and on Π: sliding; the same for a
+      junction or seam edge that does not lead from boundary to boundary, and for each edge of a patch that
+      lies on Π and has sliding vertices off the boundary;
     - junction or seam edge, both ends fixed, not leading from boundary to boundary: fixed;
     - edge inside a sheet, both ends fixed, off the boundary and on none of the curves (a held line in a
       patch): fixed; the same for the edge by which a line of two or more of them goes on to a fixed vertex
@@ -141,7 +143,13 @@ def held_midpoints(surface: Surface) -> tuple[Bools, Bools]:
     both_fixed[number[best[cosine[best] >= np.cos(np.radians(CORNER))]]] = True
     height = surface.plane.height(X)
     resting = sliding | (fixed & (np.abs(height) <= ON * surface.size))
-    slides = topo.boundary_edge & resting[start] & resting[end] & (sliding[start] | sliding[end])
+    # patches that lie on Π, such as the ground below a drop: not every one whose boundary alone does
+    flat, slips = np.ones(len(surface.patches), dtype=bool), np.zeros(len(surface.patches), dtype=bool)
+    flat[surface.patch_of_face[~resting[surface.faces].all(axis=1)]] = False
+    slips[surface.patch_of_face[(sliding & ~topo.on_boundary)[surface.faces].any(axis=1)]] = True
+    on_ground = topo.boundary_edge | inner
+    on_ground[topo.edge_of_face[(flat & slips)[surface.patch_of_face]]] = True
+    slides = on_ground & resting[start] & resting[end] & (sliding[start] | sliding[end])
     return both_fixed, slides
 
 

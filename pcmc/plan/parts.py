@@ -185,7 +185,7 @@ class PatchSpec:
         try:
             points = np.atleast_2d(np.asarray(self.at, dtype=float))
         except (TypeError, ValueError, OverflowError):
-            points = np.empty(0)
+            points = np.empty((0, 0))
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
             validate.refuse("at", self.at, "a point [x, y] or a list of points", self.name)
 
@@ -301,7 +301,7 @@ def rooms_of(spec: Any, patches: Sequence[PatchSpec], given: Any = ()) -> dict[s
     if not isinstance(spec, Mapping | None) and not (isinstance(spec, tuple) and not spec):
         validate.refuse("rooms", spec, "a mapping from names to patches and a volume")
     known = [patch.name for patch in patches]
-    for name, room in (spec or {}).items():
+    for name, room in dict(spec or {}).items():
         values = vars(room) if isinstance(room, RoomData) else room
         check_keys(values, RoomData, f"room {name!r}", ("patches", "volume"), name)
         volume = validate.number("volume", values["volume"], where=name)

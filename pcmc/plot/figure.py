@@ -236,9 +236,9 @@ def legend_entries(pictures: Iterable[Picture]) -> tuple[dict[str, Any], dict[st
 
 def _visible(image: Image, color: Floats, step: int = 2) -> bool:
     """Whether a square of 2 ``step`` pixels has the colour, in any shade: thinner lines are mixed colours."""
-    image = image[::step, ::step].astype(np.float32)
-    size, reference = np.linalg.norm(image, axis=2), float(np.linalg.norm(color))
-    direction = image / np.maximum(size, 1.0)[..., None]
+    pixels = image[::step, ::step].astype(np.float32)
+    size, reference = np.linalg.norm(pixels, axis=2), float(np.linalg.norm(color))
+    direction = pixels / np.maximum(size, 1.0)[..., None]
     alike = np.linalg.norm(direction - color / reference, axis=2) < ALIKE
     alike &= (size > SHADES[0] * 255.0 * reference) & (size < SHADES[1] * 255.0 * reference)
     return bool((alike[1:, 1:] & alike[1:, :-1] & alike[:-1, 1:] & alike[:-1, :-1]).any())

@@ -313,8 +313,9 @@ def reactions(
     lines, held = acting.per_length, acting.points.any(axis=1)
     if np.isnan(lines).all() and not held.any():
         raise OptionError("nothing holds the surface: no reactions to draw", what="surface")
-    labels = {"label": f"{units.tension} along lines", "points_label": f"{units.force or 'force'} at points"}
-    return vectors(surface, np.nan_to_num(lines), path, points=acting.points, **labels | options)
+    options = {"points_label": f"{units.force or 'force'} at points", **options}
+    options = {"label": f"{units.tension} along lines", **options}
+    return vectors(surface, np.nan_to_num(lines), path, points=acting.points, **options)
 
 
 def _print_numbers(axes: Any, surface: Surface, view: Camera, numbers: Floats, form: str) -> None:
@@ -354,7 +355,5 @@ def _thinned(at: Floats, size: Floats, most: int) -> npt.NDArray[np.intp]:
     span = np.ptp(at[keep], axis=0)
     cell = np.sqrt(max(span[0] * span[1], 1e-12 * span.max() ** 2) / most)
     square = np.floor((at[keep] - at[keep].min(axis=0)) / cell).astype(np.int64)
-    order = np.lexsort((-size[keep], square[:, 1], square[:, 0]))
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = (np.diff(square[order], axis=0) != 0).any(axis=1)
-    return keep[order[first]]
+    order = np.argsort(-size[keep], kind="stable")
+    return keep[order[np.unique(square[order], axis=0, return_index=True)[1]]]

@@ -244,7 +244,8 @@ def project_of(
         if "mesh" in data:
             if "plan" in data:
                 raise FileError("a project has a plan or a mesh, not both; remove one of them", what="plan")
-            table = {"file": data["mesh"]} if isinstance(data["mesh"], str) else dict(data["mesh"])
+            listed = data["mesh"]
+            table: dict[str, Any] = {"file": listed} if isinstance(listed, str) else {**listed}
             check_beside(table["file"], "mesh")
             mesh = MeshFile(rises=taken(table, RISES, None, keep=True), **table)
         else:

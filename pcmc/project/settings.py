@@ -281,10 +281,10 @@ class Output:
 
 
 def of_material(pattern: CuttingOptions, structure: Structure | None, surface: Surface) -> CuttingOptions:
-    """The pattern with the stiffness of [structure], and its warp if that is a cloth, unless it has its own
-    compensation. Refuses another stiffness or another warp: one roof has one cloth."""
+    """The pattern with the stiffness of [structure], unless it has its own compensation, and with its warp if
+    that is a cloth. Refuses another stiffness or another warp: one roof has one cloth."""
     pattern.check(surface)
-    if structure is None or pattern.compensation is not None:
+    if structure is None:
         return pattern
     values: dict[str, dict[str, Any]] = {key: {} for key in ("stiffness", "poisson", "direction")}
     given, thicknesses = structure.materials(surface), structure.thicknesses(surface)
@@ -292,7 +292,8 @@ def of_material(pattern: CuttingOptions, structure: Structure | None, surface: S
         material = given[name] if isinstance(given, dict) else given
         t = thicknesses[name] if isinstance(thicknesses, dict) else thicknesses
         model = [material.young * t, (material.weft or material.young) * t]
-        values["stiffness"][name], values["poisson"][name] = model, material.poisson
+        if pattern.compensation is None:
+            values["stiffness"][name], values["poisson"][name] = model, material.poisson
         own, poisson = pattern.of_patch("stiffness", name), pattern.of_patch("poisson", name)
         both = [*model, material.poisson], [*(own or model), poisson]
         if own is not None and not np.allclose(*both, rtol=1e-6, atol=0.0):

@@ -142,7 +142,7 @@ def _solve(project: Project, surface: Surface, report: OnStep) -> Outcome:
 def _meet(project: Project, surface: Surface, report: OnStep) -> Outcome:
     _newton_alone(project, "meet targets")
     solves, tolerance = count(1), project.target_tolerance
-    options = {**project.options} | ({} if tolerance is None else {"tolerance": tolerance})
+    options: dict[str, Any] = {**project.options} | ({} if tolerance is None else {"tolerance": tolerance})
     options["callback"] = lambda row: report(f"meeting the targets: solve {next(solves)}")
     design = meet(surface, project.targets, project.vary, **options)
     return _certified(design.result, report, design.status is DesignStatus.STOPPED, design=design)

@@ -113,7 +113,8 @@ def data_with_values(
             raise OptionError(f"{path.name} cannot hold the {labels} of the surface shown", what="values")
         tried.append(missing)
         if project.mesh is not None:
-            mesh = data["mesh"] = {"file": data["mesh"]} if isinstance(data["mesh"], str) else data["mesh"]
+            mesh: dict[str, Any] = {"file": data["mesh"]} if isinstance(data["mesh"], str) else data["mesh"]
+            data["mesh"] = mesh
             for (kind, name), value in missing.items():
                 if kind in KEYS:  # it holds no others
                     mesh.setdefault("patches", {}).setdefault(name, {})[KEYS[kind]] = _number(value)
@@ -249,8 +250,9 @@ class _Writer(NamedTuple):
     def split_cables(self, names: Collection[str], values: Mapping[Name, float]) -> None:
         """Lines for the cables along the outline, which have one tension there, with a tension for each."""
         for name in names:
-            ends, times = np.unique(self.asked.cables[self.asked.cable_index(name)].edges, return_counts=True)
-            tips = self.asked.plane.to_local(self.asked.vertices[ends[times == 1]])[:, :2]
+            drawn = self.start  # where a mirror cuts a cable at rest, its end has left the line
+            ends, times = np.unique(drawn.cables[drawn.cable_index(name)].edges, return_counts=True)
+            tips = drawn.plane.to_local(drawn.vertices[ends[times == 1]])[:, :2]
             if len(tips) != 2:
                 text = f"{name}: it has no two ends, so it cannot have a tension of its own in a project"
                 raise OptionError(text, what="cable", where=name)

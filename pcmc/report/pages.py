@@ -112,7 +112,7 @@ def _flowables(block: Block) -> list[Any]:
         look += [(f"{side}PADDING", *everywhere, padding) for side, padding in paddings.items()]
         look += [("LINEBELOW", (0, 0), (-1, 0), 0.6, HexColor(INK))] * headed
         widths = [width * min(WIDTH / sum(widths), 1.0) for width in widths]
-        place = {"hAlign": "LEFT", "spaceBefore": 4.0, "spaceAfter": 8.0}
+        place: dict[str, Any] = {"hAlign": "LEFT", "spaceBefore": 4.0, "spaceAfter": 8.0}
         return [*title, Grid(cells, colWidths=widths, repeatRows=int(headed), style=look, **place)]
     image = Image(io.BytesIO(block.png))
     share = min(WIDTH / image.imageWidth, TALLEST / image.imageHeight)

@@ -158,7 +158,7 @@ def family_table(schedule: Panels, units: Units) -> Table:
 
 def text_table(title: str, words: Mapping[str, Any] | pd.DataFrame, columns: Columns) -> Table:
     """A table of columns of texts, those of ``words`` first."""
-    every = {**words, **columns}
+    every: dict[Any, Any] = {**words, **columns}
     rows = [[*map(str, row)] for row in zip(*every.values(), strict=True)]
     return Table(title, [*every], rows, len(every) - len(columns))
 

@@ -23,7 +23,7 @@ VERDICTS = {  # what each verdict means for those who build
     Verdict.RAN_AWAY: "No equilibrium is known: the shape moved away without coming to rest.",
     Verdict.UNDECIDED: "Rounding of numbers hides whether the roof is in equilibrium, or stable.",
     Verdict.WALL_DOWN: "A ridge comes down on the bottom of its wall, where it cannot rest.",
-    Verdict.DEGENERATE: "Triangles of the mesh have collapsed: the shape says nothing about a roof.",
+    Verdict.DEGENERATE: "Triangles have collapsed or are folded: the shape says nothing about a roof.",
 }
 
 LEGEND = (  # of the plan

@@ -258,7 +258,7 @@ class Equilibrium:
         F = self.classes.faces
         pull = self.surface.tensions[self.classes.patch_of_face] * face_areas(self.X[F]) / 3.0
         sums = np.bincount(self.classes.topology.faces.ravel(), np.repeat(pull, 3), len(self.X))
-        return np.repeat(sums, self.space.dimension)
+        return np.repeat(np.asarray(sums, dtype=np.float64), self.space.dimension)
 
     @cached_property
     def rigid_motions(self) -> Floats:

@@ -174,7 +174,7 @@ def _supports(model: StructuralModel) -> Iterator[str]:
         yield _set(f"SUPPORT_{label}", vertices[held[vertices]])
     if len(fixed):
         yield "*BOUNDARY\nFIXED,1,3\n"
-    guides = np.column_stack([model.axes[sliding].reshape(-1, 9), model.freedom[sliding]])
+    guides = np.hstack([model.axes[sliding].reshape(-1, 9), model.freedom[sliding, None]], dtype=np.float64)
     for k, (_, those) in enumerate(_alike(guides), 1):
         leader = sliding[those][0]
         yield _set(f"GUIDE_{k}", sliding[those])

@@ -183,7 +183,8 @@ def nothing(step: Step) -> Step:
 
 def acting_together(entry: Load | Sequence[Load]) -> tuple[Load, ...]:
     """The loads of one step: those of a tuple, or a single one."""
-    return entry if isinstance(entry, tuple) and entry else (entry,)
+    together: tuple[Any, ...] = entry if isinstance(entry, tuple) and entry else (entry,)
+    return together
 
 
 def step_name(together: Sequence[Load]) -> str:

@@ -200,7 +200,7 @@ def _in_planes(P: Floats, stresses: Floats) -> Floats:
     """(k,2) the principal values, ascending, of tensors (k,3,3) in the planes of triangles (k,3,3)."""
     first, normal = unit_vectors(P[:, 1] - P[:, 0]), unit_vectors(area_vectors(P))
     plane = np.stack([first, np.cross(normal, first)], axis=1)
-    return np.asarray(np.linalg.eigvalsh(plane @ stresses @ plane.transpose(0, 2, 1)))
+    return np.asarray(np.linalg.eigvalsh(plane @ stresses @ plane.transpose(0, 2, 1)), dtype=np.float64)
 
 
 def _check(tables: list[Tables], model: StructuralModel, steps: Sequence[Step]) -> None:

@@ -201,7 +201,8 @@ def angles(P: Floats) -> Floats:
     a, b = np.roll(P, -1, axis=-2) - P, np.roll(P, 1, axis=-2) - P
     cosine = (a * b).sum(axis=-1)
     both = (a * a).sum(axis=-1) * (b * b).sum(axis=-1)
-    return np.degrees(np.arctan2(np.sqrt(np.maximum(both - cosine**2, 0.0)), cosine))
+    turned = np.arctan2(np.sqrt(np.maximum(both - cosine**2, 0.0)), cosine)
+    return np.asarray(np.degrees(turned), dtype=np.float64)
 
 
 def vertex_sums(values: Floats, F: Ints, n: int) -> Floats:
@@ -209,7 +210,8 @@ def vertex_sums(values: Floats, F: Ints, n: int) -> Floats:
     if values.ndim == 2:
         values = np.repeat(values[:, None], 3, axis=1)
     columns = values.reshape(-1, values.shape[2]).T
-    return np.stack([np.bincount(F.ravel(), column, n) for column in columns], axis=1)
+    sums = np.stack([np.bincount(F.ravel(), column, n) for column in columns], axis=1)
+    return sums.astype(np.float64, copy=False)
 
 
 def cross_2d(u: Floats, v: Floats) -> Floats:

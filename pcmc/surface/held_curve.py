@@ -127,7 +127,7 @@ def checked_curves(given: Any, X: Floats, topo: Topology, fixed: Bools, size: fl
 
     SurfaceError has the number of the first curve that is wrong.
     """
-    parts = tuple(given) if isinstance(given, Iterable) else (None,)
+    parts: tuple[Any, ...] = tuple(given) if isinstance(given, Iterable) else (None,)
     if not all(isinstance(part, HeldCurve) for part in parts):
         validate.refuse("curves", given, "a sequence of HeldCurve", error=SurfaceError)
     checked, taken = list[HeldCurve](), np.zeros(len(topo.edges), dtype=bool)

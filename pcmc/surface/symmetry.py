@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, count
-from typing import NamedTuple, TypeVar, cast
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -221,7 +221,7 @@ def _add_images(
     pairs = list(pairs)
     for image, row in zip(images, place, strict=True):
         for guide, mask in pairs:
-            new = cast(Held, guide.mapped(*image))
+            new = guide.mapped(*image)
             same = [there for other, there in found if other.same_as(new, near)]
             if not same and mask.any():
                 same.append(np.zeros(int(place.max()) + 1, dtype=bool))

@@ -6,7 +6,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Generator
-from concurrent.futures import CancelledError, Executor, Future
+from concurrent.futures import Executor, Future
 from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
@@ -167,7 +167,7 @@ def _outcome(future: Future[dict[str, Any]]) -> dict[str, Any]:
         outcome = future.result()
     except SweepError:
         raise
-    except (Exception, CancelledError) as error:
+    except Exception as error:
         text = f"{type(error).__name__}: {error}".removesuffix(": ")
         if type(error).__name__ == "KilledWorker":  # Dask's, after some tries on several workers
             message = "ended its Dask worker, several times"

@@ -186,7 +186,7 @@ def _declaration(path: Path, database: sqlite3.Connection) -> dict[str, Any]:
         raise FileError(f"{text} {written_by}", what=str(path), found=found, expected=FORMAT)
     columns = [row[1] for row in database.execute("PRAGMA table_info(cases)")]
     try:
-        declared = {**json.loads(text), "version": written_by}
+        declared: dict[str, Any] = {**json.loads(text), "version": written_by}
         axes = declared["grid"].values()
         sound = isinstance(declared["case"], str) and isinstance(declared["fixed"], dict)
         if columns != COLUMNS or not sound or not all(isinstance(axis, list) for axis in axes):

@@ -98,7 +98,7 @@ def columns_of(table: pd.DataFrame, name: str, parameters: Container[str] = ()) 
     >>> columns_of(pd.DataFrame({"a.apex": [1.0], "b.apex": [2.0], "apex": [2.0]}), "apex")
     ['a.apex', 'b.apex', 'apex']
     """
-    columns = [str(column) for column in table.select_dtypes("number") if column not in parameters]
+    columns = [str(column) for column in table.select_dtypes("number") if str(column) not in parameters]
     columns.sort(key=lambda column: "." not in column)
     return [c for c in columns if name in (c, c.rpartition(".")[2].replace("_", " "))]
 

@@ -35,7 +35,7 @@ def numbers(folder: Folder, case: str, stages: Mapping[str, Surface]) -> dict[st
     record = folder.read_table("records").set_index("case").loc[case]
     history = folder.read_table("histories")
     E = history.energy[history.case == case].to_numpy()
-    measured = {
+    measured: dict[str, Any] = {
         "initial_gradient_squared": record.initial_gradient_squared,
         "gradient_squared": record.gradient_squared,
         "least_gradient_squared": record.least_gradient_squared,

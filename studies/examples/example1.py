@@ -207,7 +207,7 @@ def _fig10(histories: pd.DataFrame) -> pd.DataFrame:
 def _numbers10(fig10: pd.DataFrame) -> dict[str, float]:
     lines = fig10.set_index("case")
     kept = ["energy_30", "energy_end", "fall_in_second_half", "total_rise", "early_rise", "forced_steps"]
-    sufficient = lines.loc["fig10-proposed-sufficient"]
+    sufficient: Any = lines.loc["fig10-proposed-sufficient"]
     iterations = {"iterations_of_energy_30": SOON, "iterations_of_early_rise": EARLY}
     rises = {f"fig10_sufficient_{key}": sufficient[key] for key in ("total_rise", "early_rise")}
     return (

@@ -102,7 +102,7 @@ def measured_vertices(surface: Surface) -> Ints:
 def settings(case: Case, short: bool = False) -> dict[str, Any]:
     """The case's options over the paper's; no tolerance, the flow stops by its iterations."""
     paper = PAPER if case.method == "nesterov" else {}
-    options = {**paper, "tolerance": None, **case.options}
+    options: dict[str, Any] = {**paper, "tolerance": None, **case.options}
     limit = "iterations" if case.method == "nesterov" else "evaluations"
     return options | {limit: min(SHORT_ITERATIONS, options[limit])} if short else options
 

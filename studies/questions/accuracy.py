@@ -186,7 +186,7 @@ def table(folder: Folder) -> dict[str, float]:
 def _best_limit(rows: pd.DataFrame) -> float:
     """The extrapolated value with the smallest bar."""
     known = rows[np.isfinite(rows.limit_error)]
-    return float(known.limit[known.limit_error.idxmin()]) if len(known) else float("nan")
+    return float(known.limit.to_numpy()[known.limit_error.argmin()]) if len(known) else float("nan")
 
 
 def _orders(rows: pd.DataFrame, limit: float) -> dict[str, float]:

@@ -138,7 +138,8 @@ def ended(surface: Surface, X: Floats) -> Surface | None:
     if not end.rooms:
         return end
     at = Equilibrium.of(end)
-    return with_room_pressures(end, np.asarray(np.linalg.lstsq(at.volume_columns, at.forces)[0]))
+    pressures = np.linalg.lstsq(at.volume_columns, at.forces)[0]
+    return with_room_pressures(end, np.asarray(pressures, dtype=np.float64))
 
 
 def surface_evolver(surface: Surface) -> End:

@@ -313,7 +313,8 @@ def table(folder: Folder) -> dict[str, float]:
         flat, bent = (mine[mine.order == order].place.to_numpy() for order in (1, 2))
         smooth = float(mine.jacobi.iloc[0])
         orders = case.orders[: len(flat) - 1]
-        row = {"case": case.name, "closed_form": case.exact, "jacobi": smooth, "finest_flat": flat[-1]}
+        row: dict[str, Any] = {"case": case.name, "closed_form": case.exact, "jacobi": smooth}
+        row |= {"finest_flat": flat[-1]}
         row |= {"extrapolated": richardson(flat, orders), "order_2": bent[-1] if len(bent) else np.nan}
         if len(bent) > 1 and case.orders[0] == 1:
             row["order_2"] = richardson(bent, (1,))

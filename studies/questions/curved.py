@@ -293,10 +293,10 @@ def figure(folder: Folder) -> None:
 
     runs = folder.read_table("records").merge(folder.read_table("times"))
     runs = runs[np.isfinite(runs.error)]
-    names = {"pcmc": "", evolver.PROGRAM: "Evolver, "}
+    names: dict[Any, str] = {"pcmc": "", evolver.PROGRAM: "Evolver, "}
     panels = {
         case.title: {
-            names[program] + elements: (mine.seconds.to_numpy(), mine.error.clip(lower=1e-15).to_numpy())
+            f"{names[program]}{elements}": (mine.seconds.to_numpy(), mine.error.clip(lower=1e-15).to_numpy())
             for (program, elements), mine in runs[runs.case == case.name].groupby(
                 ["program", "elements"], sort=False
             )

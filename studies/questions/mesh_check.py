@@ -128,7 +128,7 @@ def rows_of(case: Case) -> list[dict[str, Any]]:
     check = check_mesh(result, corners=case.corners)
     head["verdict"] = check.verdict.name.lower().replace("_", " ")
     return [
-        {**head, "quantity": quantity, "of": of, "exact": exact, **check.row(quantity, of)[list(COLUMNS)]}
+        head | {"quantity": quantity, "of": of, "exact": exact} | dict(check.row(quantity, of)[list(COLUMNS)])
         for (quantity, of), exact in case.exact.items()
     ]
 

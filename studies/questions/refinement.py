@@ -240,13 +240,13 @@ def table(folder: Folder) -> dict[str, float]:
     claim = _claim(records)
     folder.write_table("fig09", claim)
     ok = records[records.status == "converged"]
-    found = {
+    found: dict[str, float] = {
         f"{what}_{r['quantity']}_{r['family']}": float(r[what])
         for r in rows
         for what in ("order", "standard_error")
     }
     return found | {
-        **claim.filter(like="fig9_").iloc[0].to_dict(),
+        **{str(key): float(value) for key, value in claim.filter(like="fig9_").iloc[0].items()},
         "largest_variational_error": float(ok.largest_error_variational.max()),
         **{f"largest_mesh_{name}": float(mesh) for name, mesh in _largest(ok).items()},
         "not_converged": float((records.status != "converged").sum()),

@@ -119,7 +119,7 @@ def data(folder: Folder, short: bool) -> None:
 def _run(start: Surface, label: str, t0: float, short: bool) -> tuple[dict[str, Any], pd.DataFrame, float]:
     """How a run ended, samples of its way, and its processor time."""
     method, options = METHODS[label]
-    options = options | ({"t0": t0} if method == "nesterov" else {})
+    options: dict[str, Any] = options | ({"t0": t0} if method == "nesterov" else {})
     limit = {"nesterov": "iterations", "lbfgs": "evaluations"}.get(method)
     if short and limit:
         options |= {limit: SHORT_ITERATIONS}

@@ -159,6 +159,19 @@ def test_a_collapsed_triangle_is_named():
     assert found.quality < 1e-3
 
 
+def test_a_flat_sail_with_triangles_on_their_backs_is_not_certified():
+    """A free vertex beyond the rim: at rest, as it moves across the sail only, with 18 for an area of 16."""
+    rim = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]]
+    sail = Surface([*rim, [4.5, 2, 0]], [[k, (k + 1) % 4, 4] for k in range(4)], [0] * 4,
+                   [Patch("sail", 1.0, 0.0)], fixed=range(4))  # fmt: skip
+    certificate = certify(sail)
+    assert certificate.residual < 1e-12
+    assert certificate.patches.area[0] == pytest.approx(18.0)
+    assert certificate.verdict is Verdict.DEGENERATE
+    assert "patch 'sail' is folded near" in certificate.detail
+    assert certify(sail.moved([*rim, [3.9, 2, 0]])).certified
+
+
 def test_evidence_of_the_way_decides_what_the_shape_leaves_open():
     away = certify(two_squares(4), evidence=Evidence.INFLATED)
     assert away.verdict is Verdict.RAN_AWAY
@@ -292,7 +305,7 @@ def test_a_hidden_index_is_put_down_to_tensions_that_differ_widely(weak, named):
     one = pyramid()
     patches = [Patch("strong", 1.0, 0.0), Patch("weak", weak, 0.0)]
     both = Surface(one.vertices, one.faces, [0, 0, 1, 1], patches, fixed=one.fixed)
-    detail = judge(findings(spectrum=Spectrum(), surface=both))[1]
+    detail = judge(findings(spectrum=Spectrum(), surface=both, pinchable=np.zeros(2, dtype=bool)))[1]
     assert "cannot be counted" in detail
     assert ("the tensions differ by a factor of 1e+07" in detail) == named
     assert ("the tensions differ" in detail) == named

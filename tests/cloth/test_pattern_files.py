@@ -209,9 +209,15 @@ def test_the_cloth_of_the_structural_model_is_the_one_that_is_cut(tmp_path):
     words = " ".join(words_of(tmp_path / "hall.pdf"))
     assert "Cutting pattern, scale 1:" in words
     assert f"{len(pattern.strips)} strips, together" in words
-    path.write_text(text + 'direction = 0.0\n[output]\npattern = ["cloth.csv"]\n')
-    with pytest.raises(OptionError, match=r"warp of 'west' lies at 0 degrees in \[pattern\], and at 90"):
-        project.run(path)
+    path.write_text(text + 'compensation = [0.5, 1.0]\n[output]\npattern = ["cloth.csv"]\n')
+    project.run(path)
+    table = pd.read_csv(tmp_path / "cloth.csv")
+    assert table["length"].min() > 2.0
+    assert table["warp"].to_numpy() == pytest.approx(0.5)
+    for more in ("", "compensation = [0.5, 1.0]\n"):
+        path.write_text(text + f'{more}direction = 0.0\n[output]\npattern = ["cloth.csv"]\n')
+        with pytest.raises(OptionError, match=r"warp of 'west' lies at 0 degrees in \[pattern\], and at 90"):
+            project.run(path)
 
 
 def test_the_command_cuts_a_project(tmp_path, capsys):

@@ -23,6 +23,8 @@ from pcmc.explore import roof as saving
 from pcmc.explore.listening import RequestError
 from pcmc.explore.roof import ShownRoof, read_roof
 from pcmc.explore.session import Session, solved_start
+from pcmc.project import load, surface_of
+from pcmc.project.file import project_of
 from pcmc.surface.distance import difference
 
 CAP = spherical_cap(edge_length=0.25)
@@ -137,6 +139,30 @@ def test_walls_are_found_by_name_number_and_as_bare_curves(tmp_path):
     dividers = tomllib.loads(saving.project_with(roof, surface)[0])["plan"]["dividers"]
     assert [d["wall"] for d in dividers] == [0.5, 0.25]
     assert dividers[0]["curve"] == [[4, 0], [4, 4]]
+
+
+def test_a_saved_variant_writes_no_file_of_the_first_project(hall_folder):
+    """Its output has other names, that of nets and patterns, too. Before, a run wrote over the first's."""
+    text = HALL_TOML.partition("[targets]")[0] + '[pattern]\nstrips = 1\n[output]\npanels = "panels.csv"\n'
+    text += 'tolerance = 0.1\npattern = ["nets-cloth.csv"]\nnet = ["net.csv"]\nnet_size = 1.0\n'
+    (hall_folder / "nets.toml").write_text(text)
+    roof = read_roof(hall_folder / "nets.toml", start_shape=True)
+    path, _ = saving.save(roof, roof.surface, "other", False)
+    assert tomllib.loads(path.read_text())["output"]["pattern"] == ["other-cloth.csv"]
+    names = (project_of(file, tomllib.loads(file.read_text())).output.names for file in (roof.path, path))
+    assert not set.intersection(*map(set, names))
+
+
+def test_a_cable_that_ends_in_a_mirror_is_saved(tmp_path):
+    """In the roof found its end has left the outline, along the mirror."""
+    lines = "outline = [[0, 0], [4, 0], [4, 8], [0, 8]]\nmirrors = [[[4, 0], [4, 8]]]\n"
+    lines += 'edge = "cable"\ncable = 9.0\nsupports = [[0, 0, 2], [0, 8, 1]]\n'
+    path = tmp_path / "half.toml"
+    path.write_text(f"[plan]\nedge_length = 1.0\n{lines}tension = 1.0\npressure = 0.0\n")
+    roof = read_roof(path, use_cache=False)
+    state = Session(solved_start(roof.surface)).settle({"cables": {"cable 1": 10.0}})
+    saved = surface_of(load(saving.save(roof, state.surface, "other", False)[0]))
+    assert {c.name: c.tension for c in saved.cables} == {c.name: c.tension for c in state.surface.cables}
 
 
 def test_a_save_that_waits_saves_what_was_shown_when_it_was_asked_for(hall_roof, hall_folder):

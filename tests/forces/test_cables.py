@@ -143,6 +143,17 @@ def test_free_edges_of_a_flat_membrane_are_arcs_of_radius_tension_over_tension()
     assert [np.log2(a / b) for a, b in pairwise(errors)] == pytest.approx([2.0, 2.0], abs=0.1)
 
 
+def test_a_cable_pulls_on_its_ends_along_its_tangent_there():
+    """Arcs of radius 10 over the sides of length 10: cos 30° and sin 30° of the tension of 10."""
+    errors = []
+    for squares in (6, 12):
+        ends = pcmc.certify(solve(hypar_roof(squares, height=0.0)).surface).cable_ends
+        forces = np.sort(ends[["force_x", "force_y"]].abs().to_numpy())
+        errors.append(np.abs(forces - [5.0, 75.0**0.5]).max())
+    assert errors[-1] < 0.05
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.35)
+
+
 def test_a_hypar_roof_on_four_masts_is_stable(roof):
     certificate = pcmc.certify(roof)
     assert certificate.verdict is Verdict.STABLE

@@ -98,6 +98,15 @@ def test_interior_edge_between_sliding_vertices_is_free():
     assert refine(square).free[middle_of(square, 0, 2)]
 
 
+def test_a_patch_that_lies_on_the_plane_stays_on_it():
+    """An octahedron that stands on its middle: the ground there, and the line around it, slide on Π."""
+    X = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, 0]]
+    F = [[k, (k + 1) % 4, top] for top in (4, 5) for k in range(4)]
+    patches = [Patch("drop", 1.0), Patch("ground", 0.5, pressure=0.0)]
+    fine = refine(Surface(X, F, [0] * 4 + [1] * 4, patches, on_plane=[0, 1, 2, 3, 5]), levels=2)
+    np.testing.assert_array_equal(fine.on_plane, fine.vertices[:, 2] == 0.0)
+
+
 def test_a_held_line_inside_a_patch_is_held_between_its_vertices():
     t = np.arange(5.0)
     x, y = np.meshgrid(t, t, indexing="ij")

@@ -199,9 +199,10 @@ def test_a_project_with_a_net_writes_its_files_as_the_command_does(tmp_path, mon
     assert len(polygons) == len(Path("net.csv").read_text().splitlines()) - 1
     assert {"Panels and nodes in plan", "Nodes", "Panels"} < set(layouts)
     assert len(words_of("net.pdf")) == len(layouts) - 1  # besides the model
-    options = ["--pattern", "quads", "--size", "0.6", "--direction", "20", "-o", "same.obj"]
-    assert cli.main(["panels", "roof.toml", *options]) == 0
-    assert Path("same.obj").read_bytes() == Path("net.obj").read_bytes()
+    options = ["panels", "roof.toml", "--pattern", "quads", "--size", "0.6", "-o", "same.obj"]
+    for direction, same in ((), True), (("--direction", "20"), True), (("--direction", "0"), False):
+        assert cli.main([*options, *direction]) == 0
+        assert (Path("same.obj").read_bytes() == Path("net.obj").read_bytes()) == same
 
 
 def test_an_uncertified_roof_writes_nothing_or_marked_documents(tmp_path, monkeypatch):

@@ -39,7 +39,7 @@ from generators import (
     tetrahedral_film_exact,
     unduloid_length,
 )
-from pcmc import Patch, Surface, Verdict, certify, energy, solve
+from pcmc import Patch, Room, Surface, Verdict, certify, energy, solve
 from pcmc.base.errors import OptionError
 from pcmc.forces.functional import patch_areas, volume
 
@@ -144,6 +144,41 @@ def test_a_cylinder_loses_a_way_of_being_stable_at_each_half_wave(turns, index):
 def test_the_index_of_a_meridian_is_the_cylinder_s(length):
     (meridian,) = cylinder_exact(length=length).shapes.values()
     assert meridian.index(1.0) == cylinder_exact(length=length).index
+
+
+# ---- a drop on the ground: its tension there is -α cos θ, θ the angle at which it meets the ground ---
+
+
+def drop(rings, angle, volume=1.0):
+    """A drop of tension 1 that wets the plane, from a hemisphere; the wetted disc is a patch, too."""
+    cap = hemisphere(np.pi / rings, exact=True)
+    inner, (x, y, z) = ~cap.on_plane, 0.5 * cap.vertices.T
+    share = np.arctan2(np.hypot(x, y), z) / np.maximum(np.hypot(x, y), 1e-9)
+    wet = np.stack([share * x, share * y, 0.0 * z], axis=1)[inner] * 2.0 / np.pi
+    other = np.where(inner, cap.n - 1 + np.cumsum(inner), np.arange(cap.n))
+    X, F = np.concatenate([np.stack([x, y, z], axis=1), wet]), np.concatenate([cap.faces, other[cap.faces]])
+    patches = [Patch("drop", 1.0), Patch("ground", -np.cos(angle), pressure=0.0)]
+    rooms = [Room("drop", {"drop": 1}, volume)]
+    return Surface(X, F, np.repeat([0, 1], cap.m), patches, on_plane=np.unique(other), rooms=rooms)
+
+
+def test_a_drop_on_the_ground_meets_it_at_young_s_angle():
+    angle = np.radians(120.0)
+    radius = np.cbrt(3.0 / (np.pi * (2.0 + np.cos(angle)) * (1.0 - np.cos(angle)) ** 2))
+    exact = np.array([radius * (1.0 - np.cos(angle)), radius * np.sin(angle), 2.0 / radius])
+
+    def errors(rings, order=1):
+        result = solve(drop(rings, angle), order=order)
+        assert result.converged
+        assert result.certificate.index == 0
+        assert result.certificate.junctions["sum_alpha_n_max"][0] < 1.5 / rings  # the plane has sin θ
+        X, rim = result.surface.vertices, result.surface.topology.edges[result.surface.topology.seam_edge]
+        wet = np.hypot(*(X[np.unique(rim)] - X[rim].mean(axis=(0, 1)))[:, :2].T).max()
+        return np.abs([X[:, 2].max(), wet, result.rooms["pressure"][0]] - exact)
+
+    coarse, fine = errors(4), errors(8)
+    assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.25)
+    assert (errors(8, order=2) < 0.02 * fine).all()
 
 
 # ---- Delaunay's surfaces ------------------------------------------------------------------------

@@ -328,6 +328,30 @@ def test_a_project_is_solved_and_has_the_values(tmp_path, monkeypatch, capsys):
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
 
 
+def test_values_of_the_command_replace_those_of_the_patches_that_they_name(tmp_path, monkeypatch):
+    """The others keep theirs; a bare value is of all that are not named, those with their own, too."""
+    monkeypatch.chdir(tmp_path)
+    plan = "[plan]\nedge_length = 1.0\noutline = [[0, 0], [4, 0], [4, 3], [0, 3]]\n"
+    plan += "dividers = [{curve = [[2, 0], [2, 3]], wall = 2.0}]\n"
+    plan += "patches = {west = {tension = 4.0}, east = {tension = 4.0}}\n"
+    values = "[structure]\nyoung = 1e6\nthickness = 0.001\nwind = {west = 0.5, east = 0.25}\n"
+    Path("roof.toml").write_text(plan + values + "patches = {west = {thickness = 0.003}}\n")
+    given = ["structure", "roof.toml", "-o", "roof.inp"]
+
+    def thicknesses(*more):
+        assert cli.main([*given, *more]) == 0
+        found = Path("roof.inp").read_text().split("*MEMBRANE SECTION")[1:]
+        return [float(section.splitlines()[1]) for section in found]
+
+    assert thicknesses("--wind", "west=0.2") == [0.003, 0.001]
+    pressures = sections(Path("roof.inp"))["*DLOAD, OP=NEW"]
+    assert ["PATCH_1", "P1", "1.2"] in pressures
+    assert ["PATCH_2", "P1", "1.25"] in pressures
+    assert thicknesses("--thickness", "west=0.005") == [0.005, 0.001]
+    assert thicknesses("--thickness", "east=0.005") == [0.003, 0.005]
+    assert thicknesses("--thickness", "0.002") == [0.002, 0.002]
+
+
 def test_a_member_alone_has_a_weight_too(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     given = ["structure", "hall.toml", "-o", "hall.inp"]
