@@ -128,7 +128,7 @@ def mesh(
         wall = np.array([p.auxiliary for p in patches])[patch]
         bottom = X[np.intersect1d(F[wall], np.flatnonzero(held))]
         if len(bottom):
-            low |= lying(cKDTree(bottom).query(X)[0], X)
+            low |= lying(np.asarray(cKDTree(bottom).query(X)[0]), X)
         rests = low & ~held
         outer = mask_of(F[~wall], len(low))
         pinched = mask_of(patch[wall & (rests & outer)[F].any(axis=1)], len(patches))
