@@ -344,9 +344,9 @@ def _without_spans(surface: Surface, walls: Walls, resting: Bools, force: Floats
 def _edge_ends(surface: Surface, walls: Walls) -> tuple[Ints, Floats, Floats]:
     """Of both ends of each top edge: the vertex (2k,), ½ α_w ℓ (2k,), and the edge's unit vector (2k,3)."""
     feet = walls.foot[walls.top_edges]
-    held: Bools = (feet >= 0).all(axis=1)
+    held = (feet >= 0).all(axis=1, keepdims=True)
     start, end = surface.vertices[np.where(feet >= 0, feet, walls.top_edges).T]
-    span = np.where(held[:, None], end - start, surface.plane.along(end - start))
+    span = np.where(held, end - start, surface.plane.along(end - start))
     length = np.linalg.norm(span, axis=1)
     half = 0.5 * surface.tensions[walls.wall_below] * length
     along = span / np.where(length > 0.0, length, 1.0)[:, None]
