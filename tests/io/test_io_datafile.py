@@ -56,7 +56,7 @@ def test_foreign_datafile(tmp_path):
 
 
 def test_the_edges_of_a_patch_that_lies_on_the_plane_slide_on_it(tmp_path):
-    """So that Surface Evolver refines it as pcmc does: five vertices around and on the ground, eight edges."""
+    """Surface Evolver refines it as pcmc does: five vertices on the ground, and eight edges."""
     X = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, 0]]
     F = [[k, (k + 1) % 4, top] for top in (4, 5) for k in range(4)]
     patches = [pcmc.Patch("drop", 1.0), pcmc.Patch("ground", 0.5, pressure=0.0)]
