@@ -182,6 +182,8 @@ def _check_wishes(project: Project, surface: Surface, units: Units) -> None:
     with in_file(project.path):
         structure, output = project.structure, project.output
         check_apexes(project.plan, surface, project.targets, units)
+        if output.georeference is not None:
+            output.georeference.check(surface, units)
         if output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
             text = "the roof has no mirror planes, so it is the whole already; leave out whole"
             raise OptionError(f"{text}, or give the plan mirrors", what="whole")
