@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.errors import OptionError
 from ..base.libraries import load_library
 from ..base.tolerances import ON
@@ -222,9 +222,7 @@ def cut_mesh(surface: Surface, edge_length: float = np.inf) -> CutMesh:
     for cable in surface.cables:
         cut[topo.edge_numbers(cable.edges)] = True
     roof = np.flatnonzero(surface.roof[surface.patch_of_face])
-    used = np.zeros(len(cut), dtype=bool)
-    used[topo.edge_of_face[roof]] = True
-    cuts = topo.edges[cut & used].astype(np.int64)
+    cuts = topo.edges[cut & mask_of(topo.edge_of_face[roof], len(cut))].astype(np.int64)
     F = surface.faces[roof].astype(np.int64)
     return CutMesh(surface.vertices, F, parents[roof], cuts, np.full(len(cuts), -1))
 

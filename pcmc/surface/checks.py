@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.compiled import compiled
 from ..base.errors import SurfaceError
 from ..base.tolerances import NO_AREA, RESTING, RESTING_ROUNDED
@@ -83,12 +83,9 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
         if given.shape != (n,):
             refuse_shape(what, given, f"({n},) for a mask")
         return given.copy()
-    result = np.zeros(n, dtype=bool)
-    if given.size:
-        indices = _integers(given, what).ravel()
-        _within(what, indices, n, "vertex")
-        result[indices] = True
-    return result
+    indices = _integers(given, what).ravel() if given.size else np.zeros(0, dtype=np.int64)
+    _within(what, indices, n, "vertex")
+    return mask_of(indices, n)
 
 
 def pair_array(pairs: Any, n: int) -> Ints:
@@ -123,15 +120,18 @@ def mesh(
     refuse_rows("vertices", X, unused, "belongs to no face", "remove it and renumber the faces")
     flat = _flat(X, F)
     if flat.any():
-        # a wall whose junction rests on Π has no height: it shares a vertex on Π, which no support holds,
-        # with a sheet under pressure; its faces with two vertices on Π, one of them not held, may be flat
+        from scipy.spatial import cKDTree  # here, as few surfaces have flat faces
+
+        # a wall whose junction rests has no height: it shares a vertex on Π or at one of a held bottom, which
+        # no support holds, with a sheet under pressure; its faces with two such, one not held, may be flat
         low = lying(height, X)
         wall = np.array([p.auxiliary for p in patches])[patch]
+        bottom = X[np.intersect1d(F[wall], np.flatnonzero(held))]
+        if len(bottom):
+            low |= lying(np.asarray(cKDTree(bottom).query(X)[0]), X)
         rests = low & ~held
-        outer = np.zeros(len(low), dtype=bool)
-        outer[F[~wall]] = True
-        pinched = np.zeros(len(patches), dtype=bool)
-        pinched[patch[wall & (rests & outer)[F].any(axis=1)]] = True
+        outer = mask_of(F[~wall], len(low))
+        pinched = mask_of(patch[wall & (rests & outer)[F].any(axis=1)], len(patches))
         flat &= ~(wall & pinched[patch] & (low[F].sum(axis=1) >= 2) & rests[F].any(axis=1))
     if flat.any():
         fault = f"of patch {names[patch[flat.argmax()]]!r} has zero area"

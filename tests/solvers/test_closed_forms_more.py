@@ -171,13 +171,14 @@ def test_a_drop_on_the_ground_meets_it_at_young_s_angle():
         result = solve(drop(rings, angle), order=order)
         assert result.converged
         assert result.certificate.index == 0
+        assert result.certificate.junctions["sum_alpha_n_max"][0] < 1.5 / rings  # the plane has sin θ
         X, rim = result.surface.vertices, result.surface.topology.edges[result.surface.topology.seam_edge]
         wet = np.hypot(*(X[np.unique(rim)] - X[rim].mean(axis=(0, 1)))[:, :2].T).max()
         return np.abs([X[:, 2].max(), wet, result.rooms["pressure"][0]] - exact)
 
     coarse, fine = errors(4), errors(8)
     assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.25)
-    assert (errors(8, order=2) < 0.02 * fine).all()
+    assert (errors(4, order=2) < 0.05 * coarse).all()
 
 
 # ---- Delaunay's surfaces ------------------------------------------------------------------------
