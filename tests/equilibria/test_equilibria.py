@@ -342,7 +342,7 @@ def test_wrong_input_is_refused():
         find_equilibria("roof.toml")
     with refused(OptionError, what="along", found=3):
         find_equilibria(cap, [3])
-    with refused(OptionError, what="what"):
+    with refused(OptionError, what="load or tension"):
         find_equilibria(cap, "pressures")
     with refused(OptionError, what="span"):
         find_equilibria(cap, span=(1.2, 1.5))
