@@ -181,10 +181,15 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
         np.add.at(slope, F[:, c], -np.cross(X[F[:, c - 2]] - X[F[:, c - 1]], sixth))
     some = np.flatnonzero(halves.any(axis=1))
     along = np.einsum("es,esd->ed", halves[some], (direction - freed)[ends[some, ::-1]])
-    sides, slopes = pull_slopes(surface, ends[some], along)
-    stretch = sides.tension / sides.height * np.einsum("sd,sd->s", sides.out, along[sides.edge])[:, None]
-    longer = np.stack([0.0 * sides.tangent, -sides.tangent, sides.tangent], axis=1)
-    np.add.at(slope, sides.corners, sides.length[:, None] * slopes + stretch[:, None] * longer)
+    sides, slopes, _ = pull_slopes(surface, ends[some], along)
+    pulls = sides.pulls(X[sides.corners], *sides.laws(surface))
+    stretch = np.einsum("sd,sd->s", pulls, along[sides.edge])[:, None]
+    t = X[sides.corners[:, 2]] - X[sides.corners[:, 1]]
+    length = np.linalg.norm(t, axis=1)[:, None]
+    slopes *= length[:, None]
+    slopes[:, 1] -= stretch * t / length
+    slopes[:, 2] += stretch * t / length
+    np.add.at(slope, sides.corners, slopes)
     return slope
 
 
