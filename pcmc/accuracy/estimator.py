@@ -24,10 +24,10 @@ from math import sqrt
 
 import numpy as np
 
-from ..base.arrays import Floats, mask_of
-from ..certificate.forces import Forces, held_boundary
+from ..base.arrays import Floats
+from ..certificate.forces import Forces
 from ..certificate.measures import MEASURES, largest_pull, pull_slopes
-from ..certificate.supports import boundary_shares
+from ..certificate.supports import line_shares
 from ..forces.functional import energy_and_gradient
 from ..meshing.curve_cutting import limit_growth, triangles_for
 from ..stability.equilibrium import Equilibrium
@@ -156,14 +156,11 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
     if quantity in ("area", "volume"):
         return MEASURES[quantity].measure(surface, of or None).by_position
     acting = Forces.of(surface)
-    share, edges = boundary_shares(acting, of.split(" near (")[0])
+    share, halves, own = line_shares(acting, of.split(" near (")[0])
     if quantity == "reaction per length":
-        own = mask_of(edges, len(surface.topology.edges))
         return largest_pull(acting, own & acting.along_patch(None)).by_position
     # at its ends a curve has half the pulls on its own edges, and its share of the rest
     ends, size = surface.topology.edges, segment_lengths(surface.vertices, surface.topology.sides)
-    halves = 0.5 * (mask_of(edges, len(ends))[:, None] - share[ends])
-    halves[~held_boundary(surface)] = 0.0
     direction = np.array(surface.plane.normal)
     if quantity == "thrust":
         force = share @ acting.along + (halves.sum(axis=1) * size) @ acting.pulls

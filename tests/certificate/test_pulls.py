@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support_cases import cables_between_walls, half_with_mirror
+from support_cases import cables_between_walls, half_with_mirror, lens, on_unit_circle
 
 import pcmc
 from generators import spherical_cap, two_squares
@@ -103,28 +103,14 @@ def test_directions_are_those_of_the_smooth_surface_in_the_limit():
     assert errors[2] < 2e-3
 
 
-def on_unit_circle(points):
-    """Points (k,3) of the rim, moved out to it."""
-    radius = np.linalg.norm(points[:, :2], axis=1)[:, None]
-    return np.column_stack([points[:, :2] / radius, points[:, 2]])
-
-
 def test_two_sheets_on_one_ring_pull_inwards_with_an_error_of_second_order():
     """A lens of two caps, a = p = 1: each pulls with p a / 2 = α sin θ up or down, both with 2 α cos θ in."""
-    cap, alpha = spherical_cap(0.3, alpha=0.6), 0.6
-    rim = cap.fixed
-    low = np.where(rim, np.arange(cap.n), cap.n + np.cumsum(~rim) - 1)
-    X = np.concatenate([cap.vertices, cap.vertices[~rim] * [1.0, 1.0, -1.0]])
-    fixed = np.append(rim, np.zeros(np.count_nonzero(~rim), dtype=bool))
-    patches = [Patch("foil", alpha, 1.0), Patch("foil below", alpha, -1.0)]
-    lens = Surface(
-        X, np.concatenate([cap.faces, low[cap.faces]]), [0] * cap.m + [1] * cap.m, patches, fixed=fixed
-    )
+    surface, alpha = lens(), 0.6
     exact, errors = 2.0 * (alpha**2 - 0.25) ** 0.5, []
     for _ in range(3):
-        result = pcmc.solve(lens)
+        result = pcmc.solve(surface)
         errors.append(result.certificate.largest_reaction - exact)
-        lens = refine(result.surface, 1, on_unit_circle)
+        surface = refine(result.surface, 1, on_unit_circle)
     assert errors[1] < 0.3 * errors[0]
     assert errors[2] < 0.3 * errors[1]
     assert abs(errors[2]) < 3e-3 * exact
