@@ -24,7 +24,7 @@ from math import sqrt
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, mask_of
 from ..certificate.forces import Forces, held_boundary
 from ..certificate.measures import MEASURES, largest_pull, pull_slopes
 from ..certificate.supports import boundary_shares
@@ -158,11 +158,11 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
     acting = Forces.of(surface)
     share, edges = boundary_shares(acting, of.split(" near (")[0])
     if quantity == "reaction per length":
-        own = np.isin(np.arange(len(surface.topology.edges)), edges)
+        own = mask_of(edges, len(surface.topology.edges))
         return largest_pull(acting, own & acting.along_patch(None)).by_position
     # at its ends a curve has half the pulls on its own edges, and its share of the rest
     ends, size = surface.topology.edges, segment_lengths(surface.vertices, surface.topology.sides)
-    halves = 0.5 * (np.isin(np.arange(len(ends)), edges)[:, None] - share[ends])
+    halves = 0.5 * (mask_of(edges, len(ends))[:, None] - share[ends])
     halves[~held_boundary(surface)] = 0.0
     direction = np.array(surface.plane.normal)
     if quantity == "thrust":

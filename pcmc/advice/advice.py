@@ -24,12 +24,12 @@ from ..certificate.verdict import Verdict
 from ..design import Parameter, Target
 from ..plan import Divider, Plan
 from ..plan.edges import usual_cable
-from ..plan.lines import SNAP, is_straight
+from ..plan.lines import SNAP, Kind, PlanLine, is_straight
 from ..plan.parts import BALANCED
 from ..plan.proposal import ABOVE_LEAST, least_tension, plan_area
 from ..surface import Plane, Surface
 from ..surface.curves import Curve
-from ..surface.pieces import two_digits
+from ..surface.pieces import to_local, two_digits
 from .rises import Rise, net_pressures, outline_heights
 
 BEYOND_FOLD = 1.15  # times the tensions at a fold: a roof well on this side of it
@@ -120,12 +120,13 @@ def improved(plan: Plan, certificate: Certificate) -> Plan:
     grew = any(isinstance(proof, Overload) for proof in certificate.proofs)
     if grew or certificate.verdict in (Verdict.RAN_AWAY, Verdict.NONE_FOUND):
         plan = _stiffer(plan, certificate)
-    if plan.cable is not None and plan.cable < (usual := usual_cable(plan)):  # its arcs may not fit
-        plan = replace(plan, cable=usual)
-    if not plan.supports:  # a ring that a cable alone holds is at rest at one radius, and stable at none
-        rings = [hole for hole in plan.holes if hole.edge == "cable" and not hole.cable_weight]
+    # a ring that a cable alone holds is at rest at one radius, and stable at none
+    rings = [h for h in plan.holes if h.edge == "cable" and not (h.cable_weight or _supported(plan, h.curve))]
+    if rings:
         holes = [replace(h, edge="fixed", cable=None) if h in rings else h for h in plan.holes]
         plan = replace(plan, holes=holes)
+    elif plan.cable is not None and plan.cable < (usual := usual_cable(plan)):  # its arcs may not fit
+        plan = replace(plan, cable=usual)
     sliding = {divider.name for divider in plan.dividers if divider.bottom == "sliding"}
     plan = with_dividers(plan, sliding, bottom="held")  # only the mesh holds the ends of their junctions
     if certificate.verdict is Verdict.WALL_DOWN:
@@ -140,6 +141,14 @@ def improved(plan: Plan, certificate: Certificate) -> Plan:
         areas = [replace(area, tension=tension) if area.name == name else area for area in plan.patches]
         plan = replace(with_dividers(plan, own, wall=BALANCED), patches=areas)
     return plan
+
+
+def _supported(plan: Plan, curve: Curve) -> bool:
+    """Whether a support of the plan is on a curve."""
+    line = PlanLine("", Kind.HOLE, curve.local(plan.plane))
+    local = [s.local(plan.plane) if isinstance(s, Curve) else np.array([s]) for s in plan.supports]
+    places = [s.at(s.dense) if isinstance(s, Curve) else to_local(s, plan.plane) for s in local]
+    return any(line.nearest(place[:, :2])[1].min() <= SNAP * plan.edge_length for place in places)
 
 
 def _stiffer(plan: Plan, certificate: Certificate) -> Plan:

@@ -85,9 +85,18 @@ def distinct(numbers: Ints, count: int) -> Ints:
     >>> distinct(np.array([[4, 1], [1, 4]]), 5).tolist()
     [1, 4]
     """
-    occurs = np.zeros(count, dtype=bool)
-    occurs[numbers] = True
-    return np.flatnonzero(occurs)
+    return np.flatnonzero(mask_of(numbers, count))
+
+
+def mask_of(numbers: Ints | list[int], count: int) -> Bools:
+    """(count,) whether each number from 0 to count - 1 is among these.
+
+    >>> mask_of(np.array([[3, 1], [1, 3]]), 5).tolist()
+    [False, True, False, True, False]
+    """
+    mask = np.zeros(count, dtype=bool)
+    mask[numbers] = True
+    return mask
 
 
 def format_rows(template: str, *columns: npt.NDArray[Any]) -> str:

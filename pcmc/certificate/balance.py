@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..base.arrays import Bools
+from ..base.arrays import Bools, mask_of
 from ..base.tolerances import EXCESS, HARDLY, ON, PARALLEL
 from ..forces.cables import cable_pulls
 from ..forces.pinching import standing_part
@@ -38,9 +38,9 @@ def load_ratio(surface: Surface) -> float:
     """
     topo = surface.topology
     fixed = at_both_ends(surface.fixed, topo.edges)
-    corners = np.zeros(len(fixed), dtype=bool)  # edges that cut off one triangle between two held edges
     outer = topo.boundary_edge & fixed
-    corners[topo.edge_of_face[outer[topo.edge_of_face].sum(axis=1) > 1]] = True
+    # edges that cut off one triangle between two held edges
+    corners = mask_of(topo.edge_of_face[outer[topo.edge_of_face].sum(axis=1) > 1], len(fixed))
     carrying = held_boundary(surface) | (fixed & (topo.boundary_edge | ~corners))
     return _load_over_capacity(surface, carrying)
 

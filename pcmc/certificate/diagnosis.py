@@ -10,7 +10,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.tolerances import PINCHED
 from ..meshing.neighbour_swap import can_vanish, film_of
 from ..meshing.quality import edge_lengths, triangle_quality
@@ -83,7 +83,7 @@ def held_groups(surface: Surface) -> tuple[Ints, Floats]:
     topo, n = surface.topology, surface.n
     edges = topo.edges[held_boundary(surface)]
     label = components(edges, n)
-    on_curve = np.isin(np.arange(n), edges)
+    on_curve = mask_of(edges, n)
     curves, first = np.unique(label[on_curve], return_index=True)
     part = topo.components[np.flatnonzero(on_curve)[first]]
     several = curves[np.bincount(part)[part] > 1] if len(part) else curves
@@ -139,8 +139,7 @@ def _minimal_cut(edge_of_face: Ints, inner: Ints, lengths: Floats, starts: Ints,
     graph = csr_array(coo_array((data.astype(np.int32), (row, column)), shape=(sink + 1, sink + 1)))
     left = (graph - csr_array(maximum_flow(graph, source, sink).flow)).astype(float)
     left.eliminate_zeros()
-    reached = np.zeros(sink + 1, dtype=bool)
-    reached[breadth_first_order(left, source, return_predecessors=False)] = True
+    reached = mask_of(breadth_first_order(left, source, return_predecessors=False), sink + 1)
     return np.asarray(reached[m : m + k] & ~reached[m + k : m + 2 * k])
 
 
@@ -200,7 +199,7 @@ def held_wall_down(surface: Surface, pinchable: Bools) -> bool:
     Without a bottom vertex below each junction vertex such a wall cannot pinch: its triangles collapse.
     """
     X, patch = surface.vertices, int(surface.patch_of_face[worst_face(surface, pinchable)[0]])
-    used = np.isin(np.arange(surface.n), surface.faces[surface.patch_of_face == patch])
+    used = mask_of(surface.faces[surface.patch_of_face == patch], surface.n)
     top = used & surface.topology.on_junction
     bottom, top = used & surface.pinned & ~top, top & ~surface.pinned
     if not (surface.auxiliary[patch] and top.any() and bottom.any()):

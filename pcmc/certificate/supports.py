@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.tolerances import FORCE_ROUNDING, PARALLEL, SAME_PLACE
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
@@ -170,9 +170,8 @@ def held_curves(surface: Surface) -> tuple[EdgeCurve, ...]:
     stop = vertex_kind(topo.edges[topo.boundary_edge & ~surface.mirror_edge], surface.n) == POINT
     for keys in (_patch_of_edge(surface), _support_of_edge(surface)):
         for key in np.unique(keys[held]):
-            there = np.zeros((2, surface.n), dtype=bool)
-            there[0, topo.edges[held & (keys == key)]] = there[1, topo.edges[held & (keys != key)]] = True
-            stop |= there.all(axis=0)
+            own, others = (mask_of(topo.edges[held & of], surface.n) for of in (keys == key, keys != key))
+            stop |= own & others
     return topo.chains(topo.edges[held], stop)
 
 
@@ -226,7 +225,9 @@ def _sources(acting: Forces) -> Iterator[tuple[Floats, list[_Part], tuple[Bools,
 
     chosen = acting.lines.all(axis=1) & ~topo.boundary_edge & at_both_ends(acting.clamped, topo.edges)
     along = np.where(acting.on_boundary[:, None], 0.0, acting.along)
-    yield along, [_line(surface, "line", c, ", inside") for c in topo.curves_among(chosen)], None
+    found = topo.curves_among(chosen)
+    within = [_line(surface, "line", c, "" if len({*c.sheets}) > 1 else ", inside") for c in found]
+    yield along, within, None
 
     inside, standing = ~acting.clamped & ~acting.on_boundary, acting.standing
     at_rest = standing.on_ground | (acting.by_plane[0].any(axis=1) & ~acting.clamped)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, mask_of
 from ..base.tolerances import ON
 from ..base.units import Units
 from ..forces.cables import directions, pull_along
@@ -71,7 +71,7 @@ def patch_table(surface: Surface, standing: Surface) -> pd.DataFrame:
     rows = []
     for index, patch in enumerate(surface.patches):
         faces = standing.patch_of_face == index
-        inside = np.isin(np.arange(surface.n), standing.faces[faces]) & np.isfinite(curvature)
+        inside = mask_of(standing.faces[faces], surface.n) & np.isfinite(curvature)
         varies = patch.weight and inside.any()
         mean = float(curvature[inside].mean()) if inside.any() else np.nan
         row: dict[str, Any] = {
@@ -139,8 +139,7 @@ def _along_curve(
     """Lengths, |Σ α n + load| (k,) of a curve's edges; its length, middle, largest force left per length."""
     lengths = curve_lengths(surface, curve)
     pulls = sheet_pulls(surface, curve.pairs) + load
-    mirrors = [pair for pair in surface.on_planes if pair[0].mirror]
-    for plane, on in mirrors:  # its image takes the part across
+    for plane, on in ((surface.plane, surface.on_ground), *surface.on_planes):  # takes the part across
         pulls -= np.outer(on[curve.pairs].all(axis=1) * (pulls @ plane.normal), plane.normal)
     sums = np.linalg.norm(pulls, axis=1)
     most = float(np.linalg.norm(left, axis=1).max(initial=0.0)) / (float(lengths.mean()) or 1.0)

@@ -10,8 +10,7 @@ import typer
 from .arguments import with_groups
 from .building import draw_, panels_, pattern, report_, structure
 from .files import cache_, convert, explore, plan, plot, repair_, schema
-from .finding import equilibria_
-from .solving import certify_, remesh_, solve_, sweep
+from .solving import certify_, equilibria_, remesh_, solve_, sweep
 
 app = typer.Typer(
     add_completion=False,

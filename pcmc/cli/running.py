@@ -24,8 +24,7 @@ PLAIN = {ord(sign): typed for sign, typed in zip(SIGNS, TYPED.split("|"), strict
 
 def run_command(arguments: list[str]) -> int:
     """Run the command; an error becomes one line on stderr; return the exit code."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):
         for kind in SHOWN:
             warnings.simplefilter("always", kind)
         warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")

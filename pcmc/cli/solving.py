@@ -1,8 +1,9 @@
-"""The commands that solve: solve, certify, remesh, and sweep, over combinations. Each returns the code."""
+"""The commands that solve: solve, certify, remesh, sweep and equilibria. Each returns the exit code."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,14 +16,18 @@ from ..base import validate
 from ..base.errors import OptionError
 from ..base.files import suffix_of
 from ..certificate.quantities import dimension_of
+from ..equilibria import find_equilibria
 from ..io import FORMATS
+from ..plot import equilibria as diagram
+from ..plot.uses import BRANCH_VALUES
 from ..project import Outcome, Project
 from ..project.advising import Changed
 from ..project.drawn import files_of
 from ..project.file import with_rise
+from ..project.members import warn_of_members
 from ..project.planning import proposal_text
 from ..project.settings import check_names
-from ..project.writing import check_outputs, surface_files, write_all
+from ..project.writing import certified_files, check_outputs, surface_files, write_all
 from ..sweep import Sweep, draw_sweep, run, short_table, solve_case, write_table
 from ..sweep.projects import column_labels, project_sweep
 from ..sweep.solving import digest_of
@@ -312,3 +317,71 @@ def _cases(what: str, values: list[str], method: str | None, options: dict[str, 
     about: dict[str, Any] = {name: True for name, wanted in options.items() if wanted}
     about |= {"generator": what, "generator_digest": digest_of(what), "method": method or "newton"}
     return Sweep(solve_case, grid, about | fixed)
+
+
+ALONG = "Follow branches in: pressure, snow, weight, volume, or such as 'tension of west'; may be repeated."
+SPAN = "Least and largest factor on it; by default 0.5,1.5. Of what is 0 now, least and largest value."
+FACTORS = "LOW,HIGH such as 0.5,1.5"
+CHECK = "Check the mesh of each: whether finer meshes have it, too."
+VERTICAL = "Vertical axis of the diagram: height, energy or volume."
+PICTURES, TABLE = (".png", ".svg", ".pdf"), ".csv"
+
+
+def equilibria_(
+    *,
+    file: Input,
+    output: Annotated[list[Path] | None, MANY_FILES] = None,
+    along: Annotated[list[str] | None, option("NAME", ALONG)] = None,
+    span: Annotated[str | None, option("LOW,HIGH", SPAN)] = None,
+    starts: Annotated[int, count("Starts of deflated Newton around each equilibrium.")] = 6,
+    seed: Annotated[int, count("Seed of these starts.")] = 0,
+    axis: Annotated[str, option("NAME", VERTICAL)] = "height",
+    mesh_check: Annotated[bool, switch("--mesh-check", CHECK)] = False,
+    what: Shown,
+    units: FileUnits = "",
+    whole: Whole = False,
+) -> int:
+    """Search for all equilibria of a roof, stable or not, and for the energy barriers between them.
+
+    A .svg, .png or .pdf has the diagram of the branches and a picture of each equilibrium, a .csv the table;
+    of any other format each equilibrium is written as NAME-1, NAME-2 and so on. No search proves that there
+    is no further equilibrium: the last lines say what was searched.
+
+    \b
+    Examples:
+      pcmc equilibria roof.toml -o diagram.svg
+      pcmc equilibria roof.toml --along pressure --along "tension of hall" -o table.csv -o roof.pcmc
+    """
+    files = output or []
+    surfaces = [path for path in files if path.suffix.lower() not in (*PICTURES, TABLE)]
+    projects.Output(files=surfaces)  # refuses an unknown format
+    numbered = [_numbered(path, k) for path in surfaces for k in range(1, 100)]  # as many as may be found
+    pictures = [path for path in files if path.suffix.lower() in PICTURES]
+    check_outputs([*files, *numbered], inputs=files_of(file), pictures=pictures)
+    validate.choice("--axis", axis, BRANCH_VALUES)
+    if axis != "height" and not pictures:
+        raise OptionError("--axis: is of the diagram; add -o diagram.svg, or leave it out", what="--axis")
+    if seed and not starts:
+        raise OptionError("--seed: is of random starts; leave out --starts 0, or the seed", what="--seed")
+    ends: Any = None if span is None else tuple(arguments.numbers(span, "--span", FACTORS, 2))
+    with working() as progress:
+        roof = what.roof(arguments.load_project(file, units), progress, whole)
+        options: dict[str, Any] = {"starts": starts, "seed": seed, "mesh_check": mesh_check, "span": ends}
+        found = find_equilibria(roof.shown.surface, along or "pressure", callback=progress, **options)
+        jobs: list[Any] = []
+        for path in files:
+            if path in pictures:
+                jobs.append((path, partial(diagram, found, y=axis, units=roof.units)))
+            elif path.suffix.lower() == TABLE:
+                jobs.append((path, partial(found.table.to_csv, index=False)))
+            else:
+                warn_of_members(roof, path.name)
+                for k, one in enumerate(found.found, 1):
+                    jobs += certified_files(one.surface, one.certificate, [_numbered(path, k)], roof.units)
+        written = write_all(jobs, progress)
+    print(found.text(roof.units))
+    return reports.ended(True, written)
+
+
+def _numbered(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.stem}-{number}{path.suffix}")

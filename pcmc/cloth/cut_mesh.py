@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.errors import OptionError
 from ..base.libraries import load_library
 from ..base.tolerances import ON
@@ -34,7 +34,7 @@ from ..surface.topology import SIDES, Topology, components, edge_places, joined,
 SNAP = 0.1  # of an edge: a seam that passes a vertex so near goes through it
 BESIDE = 0.3  # of an edge: such a seam crosses no other edge of that vertex so near to it
 MOST_TRIANGLES = 50_000  # beyond which triangles are not cut into four
-MEET = 0.25  # of a strip's width: ends of seams of two sheets so near to each other meet
+MEET = 0.25  # of a strip's width: ends of seams so near to each other, or to where cuts meet, are one
 ANGLES = np.radians([0.0, 90.0, *range(1, 90), *range(91, 180)])  # in which the longer side is sought
 NARROWER = 0.98  # of the width square to x or y: another direction must do better
 
@@ -222,9 +222,7 @@ def cut_mesh(surface: Surface, edge_length: float = np.inf) -> CutMesh:
     for cable in surface.cables:
         cut[topo.edge_numbers(cable.edges)] = True
     roof = np.flatnonzero(surface.roof[surface.patch_of_face])
-    used = np.zeros(len(cut), dtype=bool)
-    used[topo.edge_of_face[roof]] = True
-    cuts = topo.edges[cut & used].astype(np.int64)
+    cuts = topo.edges[cut & mask_of(topo.edge_of_face[roof], len(cut))].astype(np.int64)
     F = surface.faces[roof].astype(np.int64)
     return CutMesh(surface.vertices, F, parents[roof], cuts, np.full(len(cuts), -1))
 
@@ -306,8 +304,10 @@ def level_ends(mesh: CutMesh, faces: Bools, height: Floats, level: float) -> Ite
 
 
 def with_levels(mesh: CutMesh, sheets: Sequence[ClothSheet]) -> CutMesh:
-    """The mesh cut along geodesics between the ends of each sheet's levels; ends of several sheets meet."""
-    number, before = int(mesh.seam.max(initial=-1)) + 1, list[int]()  # the vertices at ends of other sheets
+    """The mesh cut along geodesics between the ends of each sheet's levels. Ends of several sheets meet, and
+    those near a point in which cuts meet end there."""
+    number = int(mesh.seam.max(initial=-1)) + 1
+    before = np.flatnonzero(np.bincount(mesh.cuts.ravel()) > 2).tolist()  # and the ends in other sheets
     for sheet in sheets:
         meet, height = MEET * float(np.diff(sheet.levels).min()), mesh.X @ sheet.across
         own = [level_ends(mesh, sheet.source[mesh.source], height, level) for level in sheet.levels[1:-1]]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, mask_of
 from ..base.errors import OptionError, SurfaceError
 from ..certificate import Certificate
 from ..certificate.certificate import certified
@@ -109,8 +109,7 @@ def cutting_pattern_of(
 def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> list[ClothSheet]:
     """The sheets without drawn seams, at even levels."""
     piece, topo, net = base.pieces.piece, base.topology, options.net_width
-    drawn = np.zeros(len(topo.edges), dtype=bool)
-    drawn[topo.edge_numbers(base.cuts[base.seam >= 0])] = True
+    drawn = mask_of(topo.edge_numbers(base.cuts[base.seam >= 0]), len(topo.edges))
     sheets: list[ClothSheet] = []
     for k in np.setdiff1d(piece, piece[drawn[topo.edge_of_face].any(axis=1)]).tolist():
         source, P = base.source[piece == k], base.X[base.F[piece == k]]
@@ -123,7 +122,7 @@ def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> list[Cl
         if not number <= MOST_STRIPS:
             text = f"patch {name!r} would have {number:.3g} strips; at most {MOST_STRIPS} are made: give"
             raise OptionError(f"{text} a larger width, or fewer strips", what="width", found=number)
-        mine = np.isin(np.arange(surface.m), source)
+        mine = mask_of(source, surface.m)
         levels = np.linspace(low, high, max(int(number), 1) + 1)
         sheets.append(ClothSheet(name, mine, along, across, levels))
     return sheets

@@ -13,7 +13,7 @@ import pandas as pd
 from scipy.sparse import csr_array, vstack
 from scipy.sparse.linalg import splu
 
-from ..base.arrays import Bools, Floats, Ints, block_rows, cached_array
+from ..base.arrays import Bools, Floats, Ints, block_rows, cached_array, mask_of
 from ..base.tolerances import ON
 from ..forces.triangles import effective_tensions
 from ..surface import Surface
@@ -176,7 +176,7 @@ def seams_of(cloth: Cloth) -> list[Seam]:
     for (beside, number, mirror), edges in keys.items():
         alone = "mirror" if mirror else "rim"
         kind = alone if len(beside) == 1 else "seam" if number >= 0 else "junction"
-        for curve in topo.curves_among(np.isin(np.arange(len(topo.edges)), edges)):
+        for curve in topo.curves_among(mask_of(edges, len(topo.edges))):
             at = np.searchsorted(sides.edge, topo.edge_numbers(curve.pairs))[:, None] + np.arange(len(beside))
             onward = (curve.pairs[:, 0] < curve.pairs[:, 1])[:, None]
             strip, left = sides.strip[at], sides.forward[at] == onward
@@ -217,7 +217,7 @@ def flattened(
     """
     pins, places = _pins(X, strip)
     gradient, root, lengths = _gradients(X[F]), np.sqrt(face_areas(X[F])), segment_lengths(X, seams[0])
-    free = np.isin(np.arange(2 * len(X)), pins, invert=True)
+    free = ~mask_of(pins, 2 * len(X))
     y = start
     if y is None:  # the map with the least Σ A ((xₛ - yₜ)² + (xₜ + yₛ)²) that takes the pins to their places
         (g, h), w = gradient.transpose(1, 0, 2), root[:, None]

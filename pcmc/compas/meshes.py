@@ -225,8 +225,7 @@ def solve(
     >>> round(answer["meshes"][0].vertex_attribute(4, "z"), 6), answer["certificate"]["verdict"]
     (0.353553, 'stable')
     """
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         start = from_meshes(meshes, tensions=tensions, pressures=pressures, weld=weld)
         result = pcmc.solve(start, **options)
         return {
@@ -257,8 +256,7 @@ def certify(
     >>> answer["certified"], answer["verdict"]
     (True, 'stable')
     """
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         surface = from_meshes(meshes, tensions=tensions, pressures=pressures, weld=weld)
         values = _plain_certificate(pcmc.certify(surface, **options))
     return {**values, "warnings": [str(one.message) for one in caught]}

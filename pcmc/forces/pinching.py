@@ -21,7 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints, kept_with_owner, read_only
+from ..base.arrays import Bools, Floats, Ints, kept_with_owner, mask_of, read_only
 from ..base.errors import CurvedContactError
 from ..base.tolerances import EXCESS, ON
 from ..surface import Surface
@@ -144,10 +144,8 @@ class StandingPart:
         """i, j (2,n) and λ (n,); a foot that still carries a triangle slides on Π and stays where it is."""
         n, walls, resting = self.whole.n, self.walls, self.resting
         rows, owner = walls.rows, _owners(n, walls, resting)
-        stands = np.zeros(n, dtype=bool)
-        stands[self.surface.faces] = True
         gone = (resting | walls.corner)[rows.top_ends].all(axis=1)
-        gone &= ~(stands | self.whole.pinned)[rows.vertices]
+        gone &= ~(mask_of(self.surface.faces, n) | self.whole.pinned)[rows.vertices]
         vertices, ends, share = rows.vertices[gone], np.tile(np.arange(n), (2, 1)), np.zeros(n)
         ends[:, vertices], share[vertices] = rows.top_ends[gone].T, rows.fraction[gone]
         return ends[:, owner], share[owner]

@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints, distinct
+from ..base.arrays import Bools, Floats, Ints, distinct, mask_of
 from ..base.tolerances import ON
 from ..surface import Surface
 from ..surface.checks import lying
@@ -101,11 +101,10 @@ def wall_rows(
     stands = np.abs(top) > ON * surface.size
     relative = np.clip(np.divide(share, top**2, out=zero.copy(), where=stands), 0.0, 1.0)
     if not stands.all():  # steps to the foot, over those to the foot and to the top
-        inner = np.zeros(surface.n, dtype=bool)
-        inner[vertices] = True
+        inner = mask_of(vertices, surface.n)
         tops = np.unique(wall_edges[~(inner | surface.pinned)[wall_edges]])
         # a corner is foot and top at once: no path may lead through it
-        links = wall_edges[(inner | np.isin(np.arange(surface.n), tops))[wall_edges].all(axis=1)]
+        links = wall_edges[(inner | mask_of(tops, surface.n))[wall_edges].all(axis=1)]
         goals = vertices[bottom[vertices]], tops
         down, up = (_steps(links, goal, surface.n, nearest=True)[vertices] for goal in goals)
         reached = np.isfinite(down + up)
@@ -283,9 +282,8 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     """
     n, topo, X = surface.n, surface.topology, surface.vertices
     roof = ~surface.auxiliary[surface.patch_of_face]
-    roof_edge, roof_vertex = np.zeros(len(topo.edges), dtype=bool), np.zeros(n, dtype=bool)
-    roof_edge[topo.edge_of_face[roof]] = True
-    roof_vertex[surface.faces[roof]] = True
+    roof_edge = mask_of(topo.edge_of_face[roof], len(topo.edges))
+    roof_vertex = mask_of(surface.faces[roof], n)
     height = surface.plane.height(X)
     low, foot = lying(height, X), np.full(n, -1, dtype=np.int64)
     every = list[tuple[int, Ints, Ints, Ints | None]]()
@@ -309,8 +307,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
     first = np.unique(columns[0], return_index=True)[1]  # what two walls share belongs to the first
     top_edges = np.concatenate([none, *(top for _, _, top, _ in every)])
     below = np.concatenate([none[:, 0], *(np.full(len(top), index) for index, _, top, _ in every)])
-    on_top, pinchable = np.zeros(n, dtype=bool), np.zeros(len(surface.patches), dtype=bool)
-    on_top[top_edges], pinchable[below] = True, True
+    on_top, pinchable = mask_of(top_edges, n), mask_of(below, len(surface.patches))
     # on Π the side is that of the push of the sheets' pressure along its normal
     near = low[surface.faces].any(axis=1)
     F, patch = surface.faces[near], surface.patch_of_face[near]

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.errors import FileError, OptionError, unknown
 from ..base.units import NO_UNITS, Units, conversion_note, length_factor
 from ..base.validate import choice
@@ -116,8 +116,7 @@ def support_kinds(values: npt.ArrayLike) -> Ints:
 
 def without_unused(data: MeshData) -> MeshData:
     """The same without vertices that no face uses, which Surface refuses."""
-    used = np.zeros(len(data.vertices), dtype=bool)
-    used[data.faces] = True
+    used = mask_of(data.faces, len(data.vertices))
     if used.all():
         return data
     note = f"{np.count_nonzero(~used)} vertices that no face uses were left out"

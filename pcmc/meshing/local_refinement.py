@@ -7,7 +7,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from ..base import validate
-from ..base.arrays import Bools, Ints
+from ..base.arrays import Bools, Ints, mask_of
 from ..base.errors import OptionError
 from ..forces.pinching import lift, standing_part
 from ..forces.wall_rows import Walls
@@ -98,8 +98,7 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
     faces[given if is_mask else given.astype(np.int64)] = True
     if not faces.any():
         return surface
-    cut = np.zeros(len(topo.edges), dtype=bool)
-    cut[topo.edge_of_face[faces]] = True
+    cut = mask_of(topo.edge_of_face[faces], len(topo.edges))
     part = standing_part(surface)
     surface = lift(surface, part.walls, part.resting, RAISED)
     # the corner opposite each longest side; of sides equal but for rounding, one edge for all triangles

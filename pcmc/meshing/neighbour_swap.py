@@ -13,7 +13,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.errors import SurfaceError
 from ..base.tolerances import ON
 from ..forces.functional import energy, patch_volumes
@@ -264,8 +264,7 @@ def _collapsed(surface: Surface, patch: str) -> tuple[Film, _Mesh, Ints]:
 
 def _opening(surface: Surface, film: Film, mesh: _Mesh, edges: Ints) -> Floats | None:
     """(n,3) the unit vectors along which the curve opens towards A and C; None where it stays closed."""
-    at, lattice, beside = np.zeros(len(mesh.X), dtype=bool), lattice_of(surface), mesh.beside(film, edges)
-    at[edges] = True
+    at, lattice, beside = mask_of(edges, len(mesh.X)), lattice_of(surface), mesh.beside(film, edges)
     P, patch = mesh.corners(surface)[beside], mesh.patch[beside]
     normal, area = area_vectors(P), face_areas(P)
     weight = 0.5 * surface.tensions[patch] / np.where(area > 0.0, area, 1.0)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from ..base import validate
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, mask_of
 from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..forces.curvature import mean_curvature
 from ..forces.pinching import lift, standing_part
@@ -245,7 +245,7 @@ def _assembled(surface: Surface, old: CurveMesh, candidates: Sequence[CurveMesh]
     for column, (plane, before) in enumerate(surface.on_planes, start=2):
         off = ~before[surface.faces].all(axis=1)
         lies = np.bincount(surface.patch_of_face, off, len(surface.patches)) == 0  # such as an upright wall
-        inside = np.isin(np.arange(len(X)), F[lies[patch_of_face]]) & (used >= len(old.X))
+        inside = mask_of(F[lies[patch_of_face]], len(X)) & (used >= len(old.X))
         X[inside] = plane.nearest(X[inside])
         support[inside, column] = True
     ends = np.searchsorted(used, old.curves)

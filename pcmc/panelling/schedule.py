@@ -259,10 +259,8 @@ def joints(X: Floats, F: Ints, edge_of_face: Ints) -> pd.DataFrame:
     between = (angle[after] - angle) % 360.0
     between[count[group] == 1] = np.nan
     second = np.where(np.isnan(between), -1, face[after])
-    once = np.ones(len(edge), dtype=bool)
-    once[last[count == 2]] = False  # two triangles are one pair
     table = pd.DataFrame({"edge": edge, "first": face, "second": second, "dihedral": between})
-    return table[once].reset_index(drop=True)
+    return table.drop(last[count == 2]).reset_index(drop=True)  # two triangles are one pair
 
 
 def packed(panels: Iterable[Floats], wide: float, high: float) -> Iterator[tuple[int, Floats]]:

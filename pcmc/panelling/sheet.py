@@ -23,7 +23,7 @@ from scipy.sparse import block_array, coo_array, csc_array, csr_array, diags_arr
 from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import splu
 
-from ..base.arrays import Bools, Floats, Ints, block_rows
+from ..base.arrays import Bools, Floats, Ints, block_rows, mask_of
 from ..base.errors import OptionError
 from ..forces.motion_space import perpendicular
 from ..surface import Surface
@@ -72,9 +72,8 @@ class SheetMesh:
         along = unit_vectors(self.X[end] - self.X[start])
         leaving, arriving = np.zeros_like(self.X), np.zeros_like(self.X)
         leaving[start], arriving[end] = along, along
-        on_rim = np.zeros(len(self.X), dtype=bool)
-        on_rim[start] = True
-        corner = on_rim & (self.point | (np.einsum("ij,ij->i", leaving, arriving) < KINK))
+        turns = np.einsum("ij,ij->i", leaving, arriving) < KINK
+        corner = mask_of(start, len(self.X)) & (self.point | turns)
         return topo.chains(np.stack([start, end], axis=1), corner), corner
 
 

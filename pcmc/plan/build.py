@@ -249,8 +249,9 @@ def _located(specs: Sequence[PatchSpec], mesh: PlanarMesh, centroid: Floats) -> 
     bare = np.flatnonzero(owner < 0)
     if len(bare):
         place = centroid[bare[0]]
-        problem = f"the part of the plan around {point_text(place)} has no patch ({len(bare)} such parts);"
-        problem += " add one with at= inside it"
+        others = f" ({len(bare)} such parts)" if len(bare) > 1 else ""
+        problem = f"the part of the plan around {point_text(place)} has no patch{others}; add one with at="
+        problem += " inside it"
         raise PlanError(problem, what="patches", where=place.round(3).tolist())
     return owner
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.errors import PlanError, SurfaceError
 from ..base.libraries import shapely
 from ..meshing.planar import SIDES, PlanarMesh, signed_areas, triangulate
@@ -285,9 +285,9 @@ def upright_planes(draft: Draft, walls: WallMesh, sides: Sequence[Sides]) -> lis
         across = np.array([-way[1], way[0]]) / (np.linalg.norm(way) or 1.0)
         foot, tip = to_space(np.array([[*start, 0.0], [*(start + across), 0.0]]), draft.plan.plane)
         own = walls.faces[divider_of_wall[walls.label] == number]
-        held = np.zeros(len(draft.mesh.points) + len(walls.vertices), dtype=bool)
-        held[np.concatenate([*(chain.vertices for chain in chains), own.ravel()])] = True
-        planes.append((Plane(tuple(foot), tuple(tip - foot)), held))
+        held = np.concatenate([*(chain.vertices for chain in chains), own.ravel()])
+        every = len(draft.mesh.points) + len(walls.vertices)
+        planes.append((Plane(tuple(foot), tuple(tip - foot)), mask_of(held, every)))
     return planes
 
 

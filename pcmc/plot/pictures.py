@@ -355,7 +355,5 @@ def _thinned(at: Floats, size: Floats, most: int) -> npt.NDArray[np.intp]:
     span = np.ptp(at[keep], axis=0)
     cell = np.sqrt(max(span[0] * span[1], 1e-12 * span.max() ** 2) / most)
     square = np.floor((at[keep] - at[keep].min(axis=0)) / cell).astype(np.int64)
-    order = np.lexsort((-size[keep], square[:, 1], square[:, 0]))
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = (np.diff(square[order], axis=0) != 0).any(axis=1)
-    return keep[order[first]]
+    order = np.argsort(-size[keep], kind="stable")
+    return keep[order[np.unique(square[order], axis=0, return_index=True)[1]]]

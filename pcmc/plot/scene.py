@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.libraries import load_library, require
 from ..surface import Surface
 from ..surface.colours import patch_colors, rgb
@@ -141,14 +141,11 @@ def scene(drawing: Rendering, values: Floats | None, *, supports: bool, edges: b
             count, total = there.sum(axis=1), np.where(there, values[F], 0.0).sum(axis=1)
             base = np.where(count > 0, total / np.maximum(count, 1), rgb(NO_VALUE))
             colors = base[:, None] * light[..., None]
-    there = np.zeros(len(topo.edges), dtype=bool)
-    there[topo.edge_of_face[shown]] = True
+    there = mask_of(topo.edge_of_face[shown], len(topo.edges))
     chosen = np.flatnonzero(there & (topo.curve_edge | edges))
     heavy = topo.curve_edge[chosen]
     ends = surface.vertices[topo.edges[chosen]] + LIFT * surface.size * view.axes[2]
-    seen = np.zeros(surface.n, dtype=bool)
-    seen[F] = supports
-    held = np.flatnonzero(seen & surface.held)
+    held = np.flatnonzero(mask_of(F, surface.n) & surface.held & supports)
     edge_depth = _nearest(len(topo.edges), topo.edge_of_face[shown], near)[chosen]
     depth = [np.tile(near, len(P) // max(len(F), 1)), edge_depth, _nearest(surface.n, F, near)[held]]
     order = np.argsort(np.concatenate(depth), kind="stable")

@@ -48,8 +48,7 @@ def advice(project: Project, given: Surface, start: Surface, outcome: Outcome) -
         if strained is None or strained.remedy is None:
             return []
         return ["add to the command:", f"--tension {strained.remedy[0]!r}={strained.remedy[1]:g}"]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the project's own warnings were shown
+    with warnings.catch_warnings(action="ignore"):  # the project's own warnings were shown
         mended = Mended(plan, True) if certified else _mended(project, plan, outcome)
         better, targets, met, reached = mended.plan, project.targets, False, ""
         if mended.sail and project.rises:
@@ -142,8 +141,7 @@ def _found(outcome: Outcome, changed: Changed | None, step: OnStep) -> str:
     if project.swap or (not held and (design is None or design.met)):  # swapped: not of the plan
         return ""
     own, ways = (len(some) - len(project.rises) for some in (project.targets, project.vary))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the project's own warnings were shown
+    with warnings.catch_warnings(action="ignore"):  # the project's own warnings were shown
         ideas = [firmer_walls(project.plan, outcome.surface, project.rises)]
         ideas += [flatter(project.plan, project.rises)] if held else []
         ideas += [lower_lines(project.plan)] if held and project.drawing is None else []

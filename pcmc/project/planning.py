@@ -55,8 +55,7 @@ def project_text(
     name = drawing_reference(path, project) if refer else ""
     drawing = drawing_of(path, units, gap)
     values = proposed(drawing)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # no project is written that cannot be meshed
+    with warnings.catch_warnings(action="ignore"):  # no project is written that cannot be meshed
         surface_of(Project(path, plan_from(values), drawing=drawing))
     return _text(drawing, values, name, gap), drawing
 

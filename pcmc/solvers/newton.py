@@ -71,6 +71,7 @@ def newton(
         evaluations=log.evaluations,
         rows=end.rows,
         note=end.note,
+        rounded=end.status is Status.CONVERGED and end.state.at.residual > options.tolerance,
         room_changes=tuple((room_pressures(reached) - room_pressures(first)).tolist()),
         clear=[end.clear] if end.clear else [],
     )

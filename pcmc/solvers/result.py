@@ -60,6 +60,9 @@ class Status(Enum):
     )
 
 
+ROUNDED = "converged: rounding lets no step lower the residual, which is above its tolerance"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """The end of a solve. Every value describes exactly ``surface``.
@@ -73,6 +76,7 @@ class Result:
     iterations, evaluations : steps taken; passes over the triangles, for E, ∇E or its derivative.
     rows : of ``history``, with at least ``evaluation``, ``energy`` and ``gradient_squared`` (‖∇E‖²).
     note : a further finding of the solver, shown in the message.
+    rounded : whether rounding, and not the tolerance, ended a solve that converged.
     proofs : why there is no equilibrium, where that was proved.
     tried : what the search has tried, the given start first, if it found none.
     room_changes : δ of each room of prescribed volume, by which its pressure has changed, force/length².
@@ -87,6 +91,7 @@ class Result:
     evaluations: int
     rows: Sequence[Mapping[str, Any]]
     note: str = ""
+    rounded: bool = False
     proofs: tuple[Proof, ...] = ()
     tried: tuple[Attempt, ...] = ()
     room_changes: tuple[float, ...] = ()
@@ -146,7 +151,8 @@ class Result:
     @property
     def message(self) -> str:
         """A sentence that says why the solver stopped and what to do."""
-        return "; ".join(filter(None, (f"{self.method}: {self.status.value}", self.note)))
+        reason = ROUNDED if self.rounded and self.converged else self.status.value
+        return "; ".join(filter(None, (f"{self.method}: {reason}", self.note)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, mask_of
 from ..base.tolerances import FAILED, ON, PARALLEL
 from ..certificate.forces import total_load
 from ..forces.pinching import place_wall_rows
@@ -40,7 +40,7 @@ def low_start(surface: Surface) -> Surface | None:
         return None  # they lie on one line
     walls = surface.auxiliary[surface.patch_of_face]
     faces = surface.faces[~walls] if not walls.all() else surface.faces
-    roof = np.isin(np.arange(surface.n), faces)
+    roof = mask_of(faces, surface.n)
     held = surface.pinned | surface.on_ground
     place = surface.plane.to_local(surface.vertices)
     flat = place[:, :2].copy()

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Floats
+from ..base.arrays import Floats, mask_of
 from ..base.errors import OptionError
 from ..base.units import NEWTONS, Units, length_factor
 from ..surface import Surface
@@ -81,7 +81,7 @@ class Gas:
             low, high = (surface.patches[mine[k]].name for k in (sizes.argmin(), sizes.argmax()))
             text = f"gas: it has one pressure, but {low!r} has {sizes.min():g} and {high!r} {sizes.max():g}"
             raise OptionError(f"{text}; name the patches of one gas", what="Gas.patches")
-        return np.sign(pressures) * np.isin(np.arange(len(pressures)), mine)
+        return np.sign(pressures) * mask_of(mine, len(pressures))
 
     def pressure(self, surface: Surface) -> float:
         """p of the form, against the air outside."""

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, mask_of
 from ..base.errors import OptionError, unknown
 from ..base.units import Units
 from ..certificate.forces import Forces
@@ -206,8 +206,6 @@ def bars_on(
     for line in lines:
         if line.member.kind == "beam":
             alone[[v for v, _ in line.ends if surface.fixed[v]]] = True
-    rim = np.zeros(surface.n, dtype=bool)
-    rim[topo.edges[topo.boundary_edge]] = True
     points, near = np.flatnonzero(alone), BESIDE * float(np.median(segment_lengths(X, topo.edges)))
     labels = [member.label for member in given]
     for k, member in enumerate(given, 1):
@@ -221,7 +219,7 @@ def bars_on(
             problem = f"no support of one point is at {at}; there are: {known}"
         elif mirrored[here[0]]:
             problem = f"it stands in a mirror plane; {DRAW}"
-        elif member.kind == "cable" and not rim[here[0]]:
+        elif member.kind == "cable" and not topo.on_boundary[here[0]]:
             problem = f"a stay from {at}, inside the roof, would pierce it; take a point of its edge"
         elif np.linalg.norm(foot - X[here[0]]) <= SHORTEST * surface.size:
             problem = f"its foot is the point {at} that it holds; give another one"
@@ -283,7 +281,7 @@ def _top(surface: Surface, wall: int) -> Bools:
     topo, mine = surface.topology, surface.patch_of_face == wall
     roof = topo.edge_of_face[surface.roof[surface.patch_of_face]]
     sheets = np.bincount(roof.ravel(), minlength=len(topo.edges))
-    top: Bools = np.isin(np.arange(len(topo.edges)), topo.edge_of_face[mine]) & (sheets >= 2)
+    top: Bools = mask_of(topo.edge_of_face[mine], len(topo.edges)) & (sheets >= 2)
     name, standing = surface.patches[wall].name, standing_part(surface)
     if not top.any() or (standing.surface.patch_of_face == wall).sum() < mine.sum():
         text = f"member on {name!r}: its junction rests on Π, all or in parts, where it has nothing to carry"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints, cached_array
+from ..base.arrays import Bools, Floats, Ints, cached_array, mask_of
 from ..base.errors import OptionError
 from ..base.units import NO_UNITS, Units, length_factor
 from ..certificate.certificate import certified
@@ -272,10 +272,9 @@ class StructuralModel:
     @cached_array
     def nodes(self) -> Bools:
         """(n,) the vertices of elements."""
-        used = np.zeros(self.surface.n, dtype=bool)
-        used[self.standing.faces[self.active]] = used[self.beam_vertices] = True
-        used[self.standing.cable_edges.ends] = True
-        return used
+        s, beams = self.standing, self.beam_vertices
+        used = np.concatenate([s.faces[self.active].ravel(), beams, s.cable_edges.ends.ravel()])
+        return mask_of(used, s.n)
 
     @cached_array
     def on_members(self) -> Bools:

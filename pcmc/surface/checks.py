@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.compiled import compiled
 from ..base.errors import SurfaceError
 from ..base.tolerances import NO_AREA, RESTING, RESTING_ROUNDED
@@ -83,12 +83,9 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
         if given.shape != (n,):
             refuse_shape(what, given, f"({n},) for a mask")
         return given.copy()
-    result = np.zeros(n, dtype=bool)
-    if given.size:
-        indices = _integers(given, what).ravel()
-        _within(what, indices, n, "vertex")
-        result[indices] = True
-    return result
+    indices = _integers(given, what).ravel() if given.size else np.zeros(0, dtype=np.int64)
+    _within(what, indices, n, "vertex")
+    return mask_of(indices, n)
 
 
 def pair_array(pairs: Any, n: int) -> Ints:
@@ -128,10 +125,8 @@ def mesh(
         low = lying(height, X)
         wall = np.array([p.auxiliary for p in patches])[patch]
         rests = low & ~held
-        outer = np.zeros(len(low), dtype=bool)
-        outer[F[~wall]] = True
-        pinched = np.zeros(len(patches), dtype=bool)
-        pinched[patch[wall & (rests & outer)[F].any(axis=1)]] = True
+        outer = mask_of(F[~wall], len(low))
+        pinched = mask_of(patch[wall & (rests & outer)[F].any(axis=1)], len(patches))
         flat &= ~(wall & pinched[patch] & (low[F].sum(axis=1) >= 2) & rests[F].any(axis=1))
     if flat.any():
         fault = f"of patch {names[patch[flat.argmax()]]!r} has zero area"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Floats, Ints, mask_of
 from ..base.compiled import compiled
 from .geometry import area_vectors, point, to_triangle, vertex_sums
 
@@ -44,7 +44,7 @@ def difference(surface: Any, other: Any) -> Floats:
     roof, other_roof = (s.faces[s.roof[s.patch_of_face]] for s in (surface, other))
     if not (len(roof) and len(other_roof)):
         return _away(surface.vertices, other.vertices, other.faces)
-    on_roof = np.isin(np.arange(surface.n), roof)
+    on_roof = mask_of(roof, surface.n)
     away = np.empty(surface.n)
     for chosen, faces in ((on_roof, other_roof), (~on_roof, other.faces)):  # a wall may be nearer to the roof
         away[chosen] = _away(surface.vertices[chosen], other.vertices, faces)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Ints
+from ..base.arrays import Bools, Ints, mask_of
 from ..base.errors import SurfaceError
 from ..base.tolerances import ON
 from .geometry import segment_lengths
@@ -69,8 +69,7 @@ def cut(surface: Surface, plane: Plane) -> Surface:
         [(guide, mask[vertices]) for guide, mask in pairs if mask[vertices].any()]
         for pairs in (surface.on_planes, given.on_line)
     )
-    left = np.zeros(len(edges), dtype=bool)
-    left[surface.topology.edge_of_face[stays]] = True
+    left = mask_of(surface.topology.edge_of_face[stays], len(edges))
     X = np.where((side == 0)[:, None], plane.nearest(surface.vertices), surface.vertices)
     return surface.rebuilt(
         vertices=X[vertices],

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints, cached_array, read_only
+from ..base.arrays import Bools, Floats, Ints, cached_array, mask_of, read_only
 from ..base.compiled import compiled
 from ..base.errors import SurfaceError
 from ..base.tolerances import ON, PARALLEL, RESTING_ROUNDED, SAME_PLACE
@@ -61,7 +61,7 @@ class Supports(NamedTuple):
             several = (np.sum([mask for _, mask in planes], axis=0) > 1) & ~self.fixed & ~self.guided
             for meeting, rows in _by_planes(planes, several):
                 rank, line = _common_line(meeting, int(rows[0]))
-                along = np.isin(np.arange(len(fixed)), rows)
+                along = mask_of(rows, len(fixed))
                 if rank == 3:
                     fixed |= along
                 elif rank == 2:  # not one plane given several times

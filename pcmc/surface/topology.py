@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Bools, Ints, cached_array, distinct, read_only
+from ..base.arrays import Bools, Ints, cached_array, distinct, mask_of, read_only
 from ..base.compiled import compiled
 
 SHEET, CURVE, POINT = 0, 1, 2
@@ -128,9 +128,7 @@ class Topology:
 
     def _ends_of(self, edges: Bools) -> Bools:
         """(n,) the vertices of edges (e,)."""
-        mask = np.zeros(self.vertex_count, dtype=bool)
-        mask[self.edges[edges]] = True
-        return mask
+        return mask_of(self.edges[edges], self.vertex_count)
 
     @cached_array
     def on_boundary(self) -> Bools:
@@ -171,8 +169,7 @@ class Topology:
 
     def chains(self, ends: Ints, stop: Bools | bool = False) -> tuple[EdgeCurve, ...]:
         """The curves that edges (k,2) form, cut where they branch and at the vertices ``stop`` (n,)."""
-        mask = np.zeros(len(self.edges), dtype=bool)
-        mask[self.edge_numbers(ends)] = True
+        mask = mask_of(self.edge_numbers(ends), len(self.edges))
         return self._curves(mask, stop | (vertex_kind(ends, self.vertex_count) == POINT))
 
     @cached_array

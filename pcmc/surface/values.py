@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base import validate
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, mask_of
 from ..base.errors import SurfaceError
 from ..base.tolerances import ON, SAME_PRESSURE
 from .images import check_weights, goes_on_above
@@ -209,8 +209,7 @@ def wall_patches(surface: Any) -> Bools:
     between = (signs > 0.0).any(axis=0) & (signs < 0.0).any(axis=0)
     # those that go down below two others along most of their edges at junctions
     topo, X, count = surface.topology, surface.vertices, len(surface.patches)
-    of_roof = np.zeros(len(topo.edges), dtype=bool)
-    of_roof[topo.edge_of_face[carrying[surface.patch_of_face]]] = True
+    of_roof = mask_of(topo.edge_of_face[carrying[surface.patch_of_face]], len(topo.edges))
     sides = np.flatnonzero((topo.junction_edge & of_roof)[topo.edge_of_face].ravel())
     edge, patch = topo.edge_of_face.ravel()[sides], surface.patch_of_face[sides // 3]
     start, end = X[topo.edges[edge]].transpose(1, 0, 2)

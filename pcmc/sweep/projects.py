@@ -60,8 +60,7 @@ def project_sweep(
 
 def column_labels(path: str | os.PathLike[str], names: Iterable[str]) -> dict[str, str]:
     """The names of columns with the units of a project or a surface; see ``with_units``."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the sweep showed them
+    with warnings.catch_warnings(action="ignore"):  # the sweep showed them
         start = projects.start_of(projects.load(path))
     cables = {cable.name for cable in start.surface.cables}
     mine = cables - {patch.name for patch in start.surface.patches}

@@ -157,6 +157,9 @@ def test_a_ring_that_a_cable_alone_holds_is_advised_to_be_fixed(tmp_path):
     ]
     file.write_text(f"{plan}edge = 'fixed'\n")
     assert project.run(file).good
+    masts = "edge = 'cable'\ncable = 60.0\nsupports = [[0, 0], [10, 0], [10, 8], [0, 8]]\n"
+    file.write_text(f"{plan.replace(hole, masts + hole)}edge = 'cable'\ncable = 8.0\n")
+    assert project.run(file).advice == outcome.advice
 
 
 def stalled(surface, *_, **__):

@@ -199,4 +199,5 @@ def test_a_drawn_line_inside_a_sheet_is_held_up_to_its_end_on_the_boundary():
     for roof in refined(plan.surface(), 2):
         table = pcmc.certify(roof).supports
         assert sorted(table["length"]) == pytest.approx([10.0**0.5, 24.0])
+        assert table["name"].tolist() == ["patch 1", "patch 1, inside"]
         assert table["per_length_max"].max() <= 12.0 * (1.0 + 1e-12)

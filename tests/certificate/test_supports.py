@@ -221,6 +221,7 @@ def test_forces_of_a_rim_that_cancel_are_zero():
     """Both sheets of a cushion pull on its rim inwards alone, and all around."""
     cushion = pcmc.solve(Plan([[0, 0], [6, 0], [6, 4], [0, 4]], tension=3.0, cushion=1.0).surface()).surface
     certificate = pcmc.certify(cushion)
+    assert set(certificate.supports["name"]) == {"patch 1 | patch 1 below"}
     (rim,) = certificate.supports[FORCE].to_numpy().tolist()
     assert rim == [0.0, 0.0, 0.0]
     assert certificate.support == 0.0

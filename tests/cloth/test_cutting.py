@@ -15,7 +15,7 @@ from pcmc import Cable, Patch, Surface, cutting_pattern, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.cloth import CuttingOptions
 from pcmc.cloth.sewing import flattened
-from pcmc.plan import Plan
+from pcmc.plan import Divider, Plan
 
 NONE = np.empty((2, 0, 2), dtype=int)
 
@@ -160,6 +160,17 @@ def _winding(strip, points):
     angle = np.arctan2(loop[..., 1], loop[..., 0])
     steps = np.angle(np.exp(1j * (np.roll(angle, -1, axis=1) - angle)))
     return np.rint(steps.sum(axis=1) / (2.0 * np.pi)).astype(int)
+
+
+def test_seams_end_where_junctions_meet_if_they_end_near_it():
+    """Not beside that point: two sheets would share a seam of a few centimetres there."""
+    outline = [(3, 0), (6, 0), (6, 3), (9, 3), (9, 6), (6, 6), (6, 9), (3, 9), (3, 6), (0, 6), (0, 3), (3, 3)]
+    lines = [Divider([corner, (4.7, 4.6)], wall=False) for corner in ((3, 3), (6, 3), (6, 6), (3, 6))]
+    cross = solve(Plan(outline, lines, edge_length=1.0, tension=1.0, pressure=0.0).surface()).surface
+    seams = cutting_pattern(cross, strips=2).seam_table
+    assert seams["length"].min() > 1.0
+    ends = seams.loc[seams["kind"] == "seam", ["x0", "y0", "x1", "y1"]].to_numpy().reshape(-1, 2)
+    assert (np.linalg.norm(ends - (4.7, 4.6), axis=1) < 1e-9).sum() == 4
 
 
 def test_compensation_shortens_cloth_along_warp_and_weft():

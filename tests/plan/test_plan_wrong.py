@@ -1,6 +1,7 @@
 """Every way in which a plan can be wrong."""
 
 import json
+import re
 import sys
 import time
 from dataclasses import replace
@@ -86,6 +87,13 @@ SLOPED = {
 def test_wrong_plans_are_refused(changes, fields):
     with refused(PlanError, **fields):
         plan_from({"outline": BOX, "edge_length": 1.0, **tension(changes), **changes}).surface()
+
+
+@pytest.mark.parametrize(("walls", "parts"), [([WALL], ""), ([WALL, [[15, 0], [15, 12]]], " (2 such parts)")])
+def test_the_first_part_without_a_patch_is_named(walls, parts):
+    text = f"has no patch{parts}; add one with at= inside it"
+    with pytest.raises(PlanError, match=re.escape(text)):
+        Plan(BOX, walls, edge_length=1.0, patches={"a": FLAT}).surface()
 
 
 @pytest.mark.parametrize(

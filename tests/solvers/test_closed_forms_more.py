@@ -171,6 +171,7 @@ def test_a_drop_on_the_ground_meets_it_at_young_s_angle():
         result = solve(drop(rings, angle), order=order)
         assert result.converged
         assert result.certificate.index == 0
+        assert result.certificate.junctions["sum_alpha_n_max"][0] < 1.5 / rings  # the plane has sin θ
         X, rim = result.surface.vertices, result.surface.topology.edges[result.surface.topology.seam_edge]
         wet = np.hypot(*(X[np.unique(rim)] - X[rim].mean(axis=(0, 1)))[:, :2].T).max()
         return np.abs([X[:, 2].max(), wet, result.rooms["pressure"][0]] - exact)

@@ -113,6 +113,7 @@ def test_a_tolerance_that_rounding_cannot_meet_counts_as_met(backend):
     assert result.status is Status.CONVERGED
     assert result.iterations <= 20
     assert 1e-30 < result.certificate.residual < 1e-14
+    assert result.message.startswith("newton: converged: rounding lets no step lower the residual")
 
 
 def test_a_loose_tolerance_ends_early(backend):
