@@ -66,38 +66,27 @@ __all__ += ["write", "write_structure"]
 # Each name is imported at its first use. So ``import pcmc`` takes milliseconds, and the command can
 # handle Ctrl-C before numpy and scipy are imported.
 _NAMES = {
-    "accuracy": ("Margin", "MeshCheck", "MeshVerdict", "check_mesh", "margin", "solve_to_accuracy"),
-    "certificate": ("Certificate", "Verdict", "certify"),
-    "cloth": ("CuttingPattern", "cutting_pattern"),
-    "design": ("Design", "Parameter", "Target", "meet", "sensitivities"),
-    "forces.curvature": ("curvature_error", "mean_curvature", "target_curvature"),
-    "forces.functional": ("energy", "gradient"),
-    "forces.second_variation": ("hessian",),
-    "forces.rooms": ("room_volume_gradients", "room_volumes"),
-    "equilibria": ("Equilibria", "cell_stress", "find_equilibria", "free_cell"),
-    "io": ("read", "write"),
-    "io.repairing": ("Repaired", "repair"),
-    "structure": ("Material", "Member", "Profile", "StructuralModel", "analyse", "read_results"),
-    "structure.inp": ("write_structure",),
-    "structure.gas": ("Gas",),
-    "structure.loads": ("SelfWeight", "Snow", "Wind"),
-    "solvers": ("solve",),
-    "solvers.continuation": ("BoundaryMotion", "Direction", "follow"),
-    "solvers.neighbours": ("NeighbourSwap", "swap_neighbours"),
-    "panelling": ("FewerFamilies", "PanelNet", "Panels", "fewer_families", "panel_net", "panels"),
-    "surface": (
-        "Cable",
-        "Circle",
-        "Line",
-        "Patch",
-        "Plane",
-        "Room",
-        "Surface",
-        "cut",
-        "images_in",
-        "mirrored",
-    ),
-    "certificate.theorem": ("Theorem", "verify"),
+    "accuracy": "Margin MeshCheck MeshVerdict check_mesh margin solve_to_accuracy",
+    "certificate": "Certificate Verdict certify",
+    "cloth": "CuttingPattern cutting_pattern",
+    "design": "Design Parameter Target meet sensitivities",
+    "forces.curvature": "curvature_error mean_curvature target_curvature",
+    "forces.functional": "energy gradient",
+    "forces.second_variation": "hessian",
+    "forces.rooms": "room_volume_gradients room_volumes",
+    "equilibria": "Equilibria cell_stress find_equilibria free_cell",
+    "io": "read write",
+    "io.repairing": "Repaired repair",
+    "structure": "Material Member Profile StructuralModel analyse read_results",
+    "structure.inp": "write_structure",
+    "structure.gas": "Gas",
+    "structure.loads": "SelfWeight Snow Wind",
+    "solvers": "solve",
+    "solvers.continuation": "BoundaryMotion Direction follow",
+    "solvers.neighbours": "NeighbourSwap swap_neighbours",
+    "panelling": "FewerFamilies PanelNet Panels fewer_families panel_net panels",
+    "surface": "Cable Circle Line Patch Plane Room Surface cut images_in mirrored",
+    "certificate.theorem": "Theorem verify",
 }
 
 
@@ -105,7 +94,7 @@ if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> object:
         for module, names in _NAMES.items():
-            if name in names:
+            if name in names.split():
                 globals()[name] = value = getattr(import_module(f".{module}", __name__), name)
                 return value
         from importlib.util import find_spec

@@ -140,8 +140,9 @@ def _end_slopes(surface: Surface) -> Floats:
     X, walls = surface.vertices, find_walls(surface, held=True)
     pairs = np.concatenate([walls.top_edges, walls.top_edges[:, ::-1]])
     end, top = pairs[walls.corner[pairs[:, 0]] & walls.top_free[pairs[:, 1]]].T
-    rise = surface.plane.height(X[top])
-    run = np.linalg.norm(surface.plane.along(X[top] - X[end]), axis=1)
+    held, foot = walls.foot[top] >= 0, X[walls.foot[top]]
+    rise = np.where(held, np.linalg.norm(X[top] - foot, axis=1), surface.plane.height(X[top]))
+    run = np.linalg.norm(np.where(held[:, None], foot - X[end], surface.plane.along(X[top] - X[end])), axis=1)
     slopes = np.full(surface.n, np.inf)
     np.minimum.at(slopes, end, np.abs(rise) / run)
     return slopes

@@ -27,7 +27,7 @@ from ..forces.pinching import standing_part
 from ..forces.triangles import totals_and_gradient
 from ..surface import Surface
 from ..surface.checks import lying
-from ..surface.geometry import segment_lengths
+from ..surface.geometry import segment_lengths, vertex_sums
 from ..surface.parts import Cable
 from ..surface.supports import apply_supports, symmetric_part
 from ..surface.topology import EdgeCurve
@@ -83,10 +83,9 @@ def support_forces(surface: Surface) -> Floats:
     X, mesh = surface.vertices, energy_mesh(surface)
     pull = totals_and_gradient(mesh._replace(pressure=read_only(np.zeros(len(surface.patches)))), X)[1]
     add_values(cables.elements(surface, X), pull)
-    pressure = np.zeros(X.shape)
     pushed = mesh.pressure[mesh.patch, None, None] * Points.of(mesh, X).area
-    np.add.at(pressure, mesh.faces, np.einsum("qk,eqd->ekd", mesh.shapes.value, pushed))
-    total = surface.folded(pressure - pull)
+    corners = np.einsum("qk,eqd->ekd", mesh.shapes.value, pushed)
+    total = surface.folded(vertex_sums(corners, mesh.faces, len(X)) - pull)
     return apply_supports(surface, total.copy()) - total
 
 

@@ -142,6 +142,8 @@ def balance_table(acting: Forces, supports: pd.DataFrame) -> pd.DataFrame:
     if acting.surface.periodic:  # the forces across the seam have moments, and no resultant
         parts[2, 1] = np.nan
     shares = np.abs(parts).max(axis=2) / np.where(scale > 0.0, scale, 1.0)
+    pulled = float((supports["length"] * supports["per_length_max"]).sum())  # may cancel along each line
+    scale = np.maximum(scale, pulled * np.array([1.0, acting.surface.size]))
     parts[np.abs(parts) <= FORCE_ROUNDING * scale[:, None]] = 0.0
     values = np.column_stack([parts.reshape(3, 6), np.tile(about, (3, 1)), shares]).T
     columns = ["of", *columns, "force_share", "moment_share"]

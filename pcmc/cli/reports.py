@@ -33,7 +33,7 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
         print(f"targets {outcome.design.text(units)}")
         if outcome.design.met:  # otherwise the message has the values
             print(outcome.design.values(outcome.units))
-    for note in outcome.notes:
+    for note in outcome.remarks:
         print(note)
     if verdict:
         if units:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..surface import Surface
+from ..base.tolerances import ON
+from ..surface import Surface, unfolded
 from ..surface.parts import image_names, with_images
 
 NUMBERS: dict[str, dict[str, Any]] = {  # keys of numbers, with their limits
@@ -133,10 +135,27 @@ class CuttingOptions:
                 validate.choice(f"patch in {key}", name, names)
 
     def of_whole(self, piece: Surface, whole: Surface) -> CuttingOptions:
-        """The same for the whole of a piece: what is given by patches holds for their images, too."""
-        images = image_names(piece, whole)
+        """The same for the whole of a piece: patches and drawn seams hold for their images, too. OptionError
+        for points [x, y] where an image of the piece has another Π."""
+        names, near = image_names(piece, whole), 1e2 * ON * whole.size
         by_patch = {key: getattr(self, key) for key in BY_PATCH if isinstance(getattr(self, key), Mapping)}
-        return replace(self, **{key: with_images(given, images) for key, given in by_patch.items()})
+        seams: list[Floats] = []
+        for (R, t), line in product(unfolded(piece).images if self.lines else (), self.lines):
+            plan, plane = line.shape[1] == 2, piece.plane
+            image = (np.array(plane.point) + line @ plane.axes[:2] if plan else line) @ R.T + t
+            if plan:
+                local = plane.to_local(image)
+                if (np.abs(local[:, 2]) > near).any():
+                    text = (
+                        "seams: behind a mirror plane that leans the plan is another; give points [x, y, z]"
+                    )
+                    raise OptionError(text, what="seams", found=line.tolist())
+                image = local[:, :2]
+            known = (other for other in seams if other.shape == image.shape)
+            if not any(np.abs(o - i).max() <= near for o in known for i in (image, image[::-1])):
+                seams.append(image)
+        named: dict[str, Any] = {key: with_images(given, names) for key, given in by_patch.items()}
+        return replace(self, seams=[seam.tolist() for seam in seams], **named)
 
     def of_patch(self, key: str, name: str) -> Any:
         """The value of a key of ``BY_PATCH`` for a patch, by default that of the key."""

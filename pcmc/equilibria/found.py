@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -24,6 +25,10 @@ INCOMPLETE = (
     " reaches, and no start comes near, is missed. A barrier is the lowest of the saddles found, so an upper"
     " bound; a lower pass cannot be excluded."
 )
+
+
+LOST = "leads to no known end"  # how a way down ends that the solver gave up
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +159,8 @@ class Equilibria:
         """
         validate.choice("start", str(validate.integer("start", start)), [str(k) for k in self.stable])
         if to is None:
-            ways = (b.energy for b in self.barriers if b.start == start and b.to != start)
+            known = (b for b in self.barriers if not b.end.startswith(LOST))
+            ways = (b.energy for b in known if b.start == start and b.to != start)
             return min(ways, default=math.inf)
         validate.choice("to", str(validate.integer("to", to)), [str(k) for k in self.stable])
         reached, top = set[int | None]({start}), -math.inf
@@ -178,7 +184,7 @@ class Equilibria:
             half = f"All this is of a part of the roof; shapes that are not symmetric in {half} were left out"
             half += " (--whole, or the surface that pcmc.mirrored unfolds, has them)."
         given = "The search was stopped before its end." if self.stopped else ""
-        words = [*self.barrier_lines(units), *self.searched, *self.failed, given, half, INCOMPLETE]
+        words = [*self.barrier_lines(units), *self.searched, *_grouped(self.failed), given, half, INCOMPLETE]
         return "\n".join(line for line in (units.sentence if units else "", rows, *words) if line)
 
     def barrier_lines(self, units: Units = NO_UNITS) -> list[str]:
@@ -199,3 +205,23 @@ class Equilibria:
 
     def __repr__(self) -> str:
         return self.text()
+
+
+def _grouped(sentences: Sequence[str]) -> list[str]:
+    """The sentences, those about a branch that differ in one number as a single one.
+
+    >>> _grouped(["A branch ended at 0.9; try it.", "A branch passes 1.", "A branch ended at 1.2; try it."])
+    ['2 branches ended at 0.9, 1.2; try it.', 'A branch passes 1.']
+    """
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for sentence in sentences:
+        groups.setdefault(tuple(NUMBER.split(sentence)), []).append(sentence)
+    lines = list[str]()
+    for words, alike in groups.items():
+        columns = [list(dict.fromkeys(column)) for column in zip(*map(NUMBER.findall, alike), strict=True)]
+        if words[0].startswith("A branch ") and sum(len(column) > 1 for column in columns) == 1:
+            numbers = [", ".join(column) for column in columns]
+            text = "".join(word for pair in zip(words, [*numbers, ""], strict=True) for word in pair)
+            alike = [text.replace("A branch", f"{len(alike)} branches").replace(" on it is ", " on them is ")]
+        lines += alike
+    return lines

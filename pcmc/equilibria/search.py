@@ -22,7 +22,7 @@ from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
 from .branches import Span, TracedParameter, join_branches
-from .found import Equilibria, FoundEquilibrium, WayDown
+from .found import LOST, Equilibria, FoundEquilibrium, WayDown
 from .from_known import deflated_newton, pass_between, way_down, with_good_triangles
 from .shapes import Shape
 
@@ -310,7 +310,7 @@ class _Search:
                 to = None
                 if status is Status.CONVERGED:
                     to = self.add(with_good_triangles(surface), "on the way down from a saddle")
-                end = "" if to is not None else ENDS.get(status, f"no minimum ({status.name.lower()})")
+                end = "" if to is not None else ENDS.get(status, f"{LOST} ({status.name.lower()})")
                 ends.append(end)
                 if one.index == 1:
                     self.ways.append(WayDown(number, to, end))

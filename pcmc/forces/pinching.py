@@ -7,7 +7,7 @@ the wall below has no area: its vertices are at places on the junction, and its 
 ``StandingPart`` remains, from which the whole surface follows; solvers and branches carry it along. In a file
 positions alone show which walls are pinched.
 
-A wall whose bottom is held on Π can pinch where each top vertex has a bottom vertex below it. The junction
+A wall whose bottom is held can pinch where each top vertex has a bottom vertex below it. The junction
 then rests on that curve, not on Π: a resting vertex is fixed on its bottom vertex, as long as the pull of the
 sheets across the curve, to whichever side, is at most α_w per length. No wall with a held bottom pinches
 before a solver has asked for it (``find_walls``): a solver asks where a junction comes down.
@@ -343,9 +343,10 @@ def _without_spans(surface: Surface, walls: Walls, resting: Bools, force: Floats
 
 def _edge_ends(surface: Surface, walls: Walls) -> tuple[Ints, Floats, Floats]:
     """Of both ends of each top edge: the vertex (2k,), ½ α_w ℓ (2k,), and the edge's unit vector (2k,3)."""
-    ends = np.where(walls.foot >= 0, walls.foot, np.arange(surface.n))[walls.top_edges]
-    start, end = surface.vertices[ends.T]
-    span = surface.plane.along(end - start)
+    feet = walls.foot[walls.top_edges]
+    held = (feet >= 0).all(axis=1, keepdims=True)
+    start, end = surface.vertices[np.where(feet >= 0, feet, walls.top_edges).T]
+    span = np.where(held, end - start, surface.plane.along(end - start))
     length = np.linalg.norm(span, axis=1)
     half = 0.5 * surface.tensions[walls.wall_below] * length
     along = span / np.where(length > 0.0, length, 1.0)[:, None]

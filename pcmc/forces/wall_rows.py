@@ -140,9 +140,7 @@ def _steps(edges: Ints, goals: Ints, n: int, nearest: bool = False) -> Floats:
     return np.asarray(dijkstra(graph, indices=goals, **options))
 
 
-def held_walls(
-    surface: Surface, roof_edge: Bools, roof_vertex: Bools, low: Bools, all_of_them: bool
-) -> list[tuple[int, Ints, Ints, Ints]]:
+def held_walls(surface: Surface, roof_edge: Bools, all_of_them: bool) -> list[tuple[int, Ints, Ints, Ints]]:
     """Walls with a held bottom that can pinch: patch, edges, top edges, and the foot (n,) of each top vertex.
 
     These have one top edge to either side of each junction vertex, or end on another plane that it slides on,
@@ -150,7 +148,7 @@ def held_walls(
     """
     topo, X, rests = surface.topology, surface.vertices, all_of_them
     walls = list[tuple[int, Ints, Ints, Ints]]()
-    bottom = topo.boundary_edge & (surface.pinned & low)[topo.edges].all(axis=1)
+    bottom = topo.boundary_edge & surface.pinned[topo.edges].all(axis=1)
     meeting = np.zeros(surface.n, dtype=np.int64)  # the walls whose top edges have the vertex
     for index in np.flatnonzero(surface.auxiliary).tolist():
         of_wall = topo.edges_of(surface.patch_of_face == index)
@@ -159,8 +157,7 @@ def held_walls(
         meeting[np.unique(top)] += 1
         if not bottom[of_wall].any() or surface.on_ground[vertices].any():
             continue
-        below = vertices[surface.pinned[vertices] & ~roof_vertex[vertices]]
-        if not len(top) or not low[below].all():
+        if not len(top):
             continue
         foot = _held_feet(surface, top, topo.edges[of_wall[bottom[of_wall] & ~roof_edge[of_wall]]])
         if foot is None:
@@ -195,7 +192,8 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
     """(n,) the held bottom vertex below each top vertex of a wall, -1 elsewhere; None if they do not pair.
 
     As many steps along the top and along the bottom from each end of the wall make a pair. It ends where top
-    and bottom meet, and in planes that one vertex of each lies in; a closed one where they are nearest.
+    and bottom meet, and in planes that one vertex of each lies in. Of one without such ends the nearest pair
+    is taken: of the ends between which it hangs from other walls, or of the edges of a closed one.
     """
     n, tops, bottoms = surface.n, np.unique(top_edges), np.unique(bottom_edges)
     corners, count = np.intersect1d(tops, bottoms), len(tops)
@@ -206,11 +204,12 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
             ends.append(np.array(pair))
     if count != len(bottoms):
         return None
-    closed = len(top_edges) == len(bottom_edges) == count
-    if closed and sum(map(np.size, ends)) == 0:
-        ways, X = np.concatenate([bottom_edges, bottom_edges[:, ::-1]]), surface.vertices
-        apart, way = map(np.asarray, cKDTree(X[ways].reshape(-1, 6)).query(X[top_edges].reshape(-1, 6)))
-        ends = [np.array([top_edges[apart.argmin()], ways[way[apart.argmin()]]])]
+    if sum(map(np.size, ends)) == 0:
+        loose = [np.flatnonzero(np.bincount(edges.ravel()) == 1) for edges in (top_edges, bottom_edges)]
+        above, below = map(np.atleast_2d, loose) if min(map(len, loose)) == 2 else (top_edges, bottom_edges)
+        ways, X = np.concatenate([below, below[:, ::-1]]), surface.vertices
+        apart, way = map(np.asarray, cKDTree(X[ways].reshape(-1, 6)).query(X[above].reshape(-1, 6)))
+        ends = [np.array([above[apart.argmin()], ways[way[apart.argmin()]]])]
     top_ends, bottom_ends = np.concatenate(ends, axis=1)
     if not len(top_ends):
         return None
@@ -232,7 +231,7 @@ class Walls:
     top_edges: Ints  # (k,2)
     wall_below: Ints  # (k,) the patch of the wall below each of them
     top_free: Bools  # (n,) free vertices of top edges: these can come to rest on Π
-    corner: Bools  # (n,) fixed vertices of top edges on Π, where a wall ends
+    corner: Bools  # (n,) fixed vertices of top edges on Π or the bottom, where a wall ends
     side: Floats  # (n,) +1 or -1, the side of Π a vertex is on; on Π, the side the pressure pushes it to
     pinchable: Bools  # (patches,) the patches that are such walls
     foot: Ints  # (n,) for vertices of top edges the vertex below it on a held bottom; -1 elsewhere
@@ -295,7 +294,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
             every.append((index, edges, top, None))
     none = np.empty((0, 2), dtype=np.int64)
     sliding = np.concatenate([none, *(top for _, _, top, _ in every)])
-    for index, edges, top, feet in held_walls(surface, roof_edge, roof_vertex, low, held):
+    for index, edges, top, feet in held_walls(surface, roof_edge, held):
         if not np.isin(top, sliding).any():
             foot = np.where(feet >= 0, feet, foot)
             every.append((index, edges, top, feet))
@@ -318,7 +317,7 @@ def find_walls(surface: Surface, held: bool = False) -> Walls:
         top_edges=top_edges,
         wall_below=below,
         top_free=on_top & ~surface.pinned & ~surface.on_ground,
-        corner=on_top & surface.pinned & low,
+        corner=on_top & surface.pinned & (low | (foot == np.arange(n))),
         side=np.where(np.where(low, push, height) < 0.0, -1.0, 1.0),
         pinchable=pinchable,
         foot=foot,

@@ -23,11 +23,11 @@ from ..base.arrays import Ints, format_rows
 from ..base.errors import FileError
 from ..forces.flat_pieces import flat_pieces
 from ..forces.rooms import closing_volumes, room_pressures
-from ..meshing.refinement import edges_on_planes
+from ..meshing.refinement import edges_on_planes, held_midpoints
 from ..surface import Surface
 from .evolver_reading import ROUNDING, read
 from .formats import Content
-from .mesh_data import FREE, SLIDING, support_of
+from .mesh_data import FIXED, FREE, SLIDING, support_of
 from .text import escaped
 
 __all__ = ["read", "write"]
@@ -115,12 +115,9 @@ def _definitions(surface: Surface, weights: Sequence[float]) -> str:
 
 
 def _tags(surface: Surface) -> tuple[Any, Any]:
-    """What follows the numbers of each vertex (n,) and edge (e,). Boundary edges with held ends are held."""
-    topo, support = surface.topology, support_of(surface, planes=True)
-    of_edge = support[topo.edges].min(axis=1)
-    off_plane = np.abs(surface.plane.height(surface.vertices)) > 1e-9 * surface.size
-    of_edge[(of_edge == SLIDING) & off_plane[topo.edges].any(axis=1)] = FREE
-    of_edge[~topo.boundary_edge] = FREE
+    """What follows the numbers of each vertex (n,) and edge (e,). Edges are held as on a refined surface."""
+    support, (fixed, slides) = support_of(surface, planes=True), held_midpoints(surface)
+    of_edge = np.where(fixed, FIXED, np.where(slides, SLIDING, FREE))
     at_vertices, at_edges = [mask for _, mask in surface.on_planes], edges_on_planes(surface)
     kinds, tags = np.array(["", " constraint 1", " fixed"]), []
     for kind, masks in ((support, at_vertices), (of_edge, at_edges)):
@@ -133,7 +130,7 @@ def _tags(surface: Surface) -> tuple[Any, Any]:
     for k, vertex in enumerate(flat_pieces(surface).end):
         vertices[vertex] += f" corner_{k}"
     for k, cable in enumerate(surface.cables, 1):
-        edges[topo.edge_numbers(cable.edges)] += f" tension {cable.tension!r} cable {k}"
+        edges[surface.topology.edge_numbers(cable.edges)] += f" tension {cable.tension!r} cable {k}"
     return vertices, edges
 
 

@@ -6,6 +6,12 @@ import re
 from dataclasses import dataclass
 
 from ..base import validate
+from ..base.errors import OptionError
+from ..base.units import Units, length_factor
+from ..surface import Surface
+
+FAR = 10.0  # sizes of a surface from zero: what is nearer tells nothing about a map
+SAME = 0.05  # of eastings or northings: what is so near to them is the same place
 
 
 @dataclass(frozen=True)
@@ -34,3 +40,14 @@ class Georeference:
             validate.refuse("crs", self.crs, 'a coordinate system such as "EPSG:25832"')
         for name in ("eastings", "northings", "height", "rotation"):
             validate.number(name, getattr(self, name))
+
+    def check(self, surface: Surface, units: Units) -> None:
+        """Refuse eastings or northings that the surface's own coordinates have already."""
+        metre = length_factor(units.length, "m")
+        middle, far = metre * surface.vertices.mean(axis=0), FAR * metre * surface.size
+        for name, axis, found in zip(("eastings", "northings"), "xy", middle[:2].tolist(), strict=True):
+            given = getattr(self, name)
+            if abs(given) > far and abs(found - given) < SAME * abs(given):
+                text = f"{name} = {given:.12g}: the surface is at {axis} = {found:.0f} m itself, and would be"
+                text += f" at twice the place; leave {name} out, or draw it near [0, 0]"
+                raise OptionError(text, what=name, found=given)

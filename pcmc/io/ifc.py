@@ -146,6 +146,7 @@ class _Model:
         """The map's coordinate system, in metres, and how to get there from that of the file."""
         if (place := self.place) is None:
             return
+        place.check(self.surface, self.units)
         metre, turn = self.add("IfcSIUnit", UnitType="LENGTHUNIT", Name="METRE"), math.radians(place.rotation)
         self.add(
             "IfcMapConversion",

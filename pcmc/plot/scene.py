@@ -58,11 +58,7 @@ def view_of(surface: Surface, view: str | tuple[float, float]) -> Camera:
     if isinstance(view, str):
         view = VIEWS[validate.choice("view", view, tuple(VIEWS))]
     azimuth, elevation = (math.radians(a) for a in view)
-    up = np.array(surface.plane.normal)
-    first = next(e for e in np.eye(3) if abs(e @ up) < 0.9)
-    first = first - (first @ up) * up
-    first /= np.linalg.norm(first)
-    second = np.cross(up, first)
+    first, second, up = surface.plane.axes
     away = math.cos(azimuth) * first + math.sin(azimuth) * second
     towards = math.cos(elevation) * away + math.sin(elevation) * up
     right = np.cross(up, away)

@@ -15,7 +15,7 @@ from . import keys
 from .keys import KINDS, OR_CURVE, REQUIRED, Section, fits, main_sections, solve_section, target_sections
 
 LONGEST = 1023  # bits of a float's exponent
-VALUE = re.compile(r"(?<![\w.])[-+]?\d[\d_]*\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")  # a number of TOML
+VALUE = re.compile(r"(?<![\w.])[-+]?(?:\d[\d_]*\.?\d*(?:[eE][-+]?\d+)?|inf|nan)(?![\w.])")  # of TOML
 Place = tuple[str, ...]  # the keys that lead to a table or a value
 
 
@@ -140,7 +140,7 @@ def line_with(path: Path, found: object) -> int:
     def has(line: str) -> bool:
         if isinstance(found, str):
             return f'"{found}"' in line or f"'{found}'" in line
-        return any(float(text) == found for text in VALUE.findall(line.split("#")[0]))
+        return any(str(float(text)) == str(float(found)) for text in VALUE.findall(line.split("#")[0]))
 
     numbers = [number for number, line in enumerate(lines, 1) if has(line)]
     return numbers[0] if len(numbers) == 1 else 0

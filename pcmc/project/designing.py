@@ -22,7 +22,7 @@ from . import cache
 from .advising import Changed, advice, firmer
 from .checking import in_file
 from .file import Project, load
-from .outcome import EXTENSIVE, OnStep, Outcome, ignore
+from .outcome import OnStep, Outcome, ignore
 from .settings import of_material
 from .solving import solve_and_swap, solve_project
 from .start import start_of
@@ -170,8 +170,6 @@ def solve_from_start(project: Project, report: OnStep, changed: Changed | None) 
         notes = [*chosen_values(project.plan, project.chosen.text, given.surface, surface), *notes]
     if project.drawing is not None or start.data is not None:
         notes += metres_note(project.output.files, start.units.length)
-    if project.output.whole and any(target.quantity in EXTENSIVE for target in project.targets):
-        notes.append("targets of areas, volumes and lengths are those of the part between the mirror planes")
     outcome = replace(solved, notes=notes, units=start.units, data=start.data)
     if outcome.good or swapped:
         return outcome
@@ -184,6 +182,8 @@ def _check_wishes(project: Project, surface: Surface, units: Units) -> None:
     with in_file(project.path):
         structure, output = project.structure, project.output
         check_apexes(project.plan, surface, project.targets, units)
+        if output.georeference is not None:
+            output.georeference.check(surface, units)
         if output.whole and not any(plane.mirror for plane, _ in surface.on_planes):
             text = "the roof has no mirror planes, so it is the whole already; leave out whole"
             raise OptionError(f"{text}, or give the plan mirrors", what="whole")

@@ -160,6 +160,15 @@ class Outcome:
         return message, detail
 
     @property
+    def remarks(self) -> list[str]:
+        """The notes, and whose the targets are where the whole is shown."""
+        targets = () if self.project is None else self.project.targets
+        if not (self.unfold and any(target.quantity in EXTENSIVE for target in targets)):
+            return [*self.notes]
+        part = "targets of areas, volumes and lengths are those of the part between the mirror planes"
+        return [*self.notes, part]
+
+    @property
     def mark(self) -> str:
         """What files, pictures and documents are marked with; empty where all is in order, and where
         nothing is known, as of a surface that another program wrote."""

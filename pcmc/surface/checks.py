@@ -120,10 +120,15 @@ def mesh(
     refuse_rows("vertices", X, unused, "belongs to no face", "remove it and renumber the faces")
     flat = _flat(X, F)
     if flat.any():
-        # a wall whose junction rests on Π has no height: it shares a vertex on Π, which no support holds,
-        # with a sheet under pressure; its faces with two vertices on Π, one of them not held, may be flat
+        from scipy.spatial import cKDTree  # here, as few surfaces have flat faces
+
+        # a wall whose junction rests has no height: it shares a vertex on Π or at one of a held bottom, which
+        # no support holds, with a sheet under pressure; its faces with two such, one not held, may be flat
         low = lying(height, X)
         wall = np.array([p.auxiliary for p in patches])[patch]
+        bottom = X[np.intersect1d(F[wall], np.flatnonzero(held))]
+        if len(bottom):
+            low |= lying(np.asarray(cKDTree(bottom).query(X)[0]), X)
         rests = low & ~held
         outer = mask_of(F[~wall], len(low))
         pinched = mask_of(patch[wall & (rests & outer)[F].any(axis=1)], len(patches))

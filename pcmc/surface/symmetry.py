@@ -44,7 +44,7 @@ class Whole:
     surface: Surface
     vertex: Ints  # (n,) the vertex of the piece that each of the whole is an image of
     face: Ints  # (m,) the face
-    images: int  # how often the piece is in the whole
+    images: Sequence[Image]  # of the piece, itself first
 
 
 def mirrored(surface: Surface, planes: Sequence[Plane | str] | None = None) -> Surface:
@@ -129,7 +129,7 @@ def unfolded(surface: Surface, planes: Sequence[Plane | str] | None = None) -> W
         rooms=_rooms(surface, meets, next_to, label, names),
         curves=_curves(surface, images, place),
     )
-    return Whole(whole, first % surface.n, np.tile(np.arange(surface.m), k), k)
+    return Whole(whole, first % surface.n, np.tile(np.arange(surface.m), k), images)
 
 
 def _chosen(surface: Surface, planes: Sequence[Plane | str] | None) -> list[tuple[Plane, Bools]]:

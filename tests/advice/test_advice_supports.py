@@ -91,6 +91,28 @@ def test_supports_on_lines_are_no_point_masts():
     assert ringed.holes[-1].curve.length == pytest.approx(3.14159, rel=1e-3)
 
 
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.FileWarning")
+def test_a_point_that_is_too_high_for_any_ring_gets_a_lower_one(tmp_path):
+    """The point that names its patch is inside the ring, and moves out of it."""
+    plan = "[plan]\noutline = [[0, 0], [10, 0], [10, 8], [0, 8]]\nedge_length = 0.7\nsupports = [[5, 4, 6]]\n"
+    file = tmp_path / "tent.toml"
+    file.write_text(f"{plan}patches = {{roof = {{tension = 3.8, at = [5, 4.5]}}}}\n")
+    outcome = project.run(file)
+    assert outcome.advice[1:] == [
+        "[[plan.holes]]",
+        'name = "mast 1"',
+        "curve = {circle = {centre = [5, 4, 4.3], radius = 2.2}}",
+        "[plan] supports: remove [5, 4, 6]",
+        "[plan.patches] roof: at = [[5.0, 6.64]]  (now [5, 4.5])",
+    ]
+    with pytest.warns(FileWarning, match=r"4\.3\], radius = 2\.2\}\}, as none can be so high as the point"):
+        project.load(file)
+    ring = "holes = [{curve = {circle = {centre = [5, 4, 4.3], radius = 2.2}}}]\n"
+    plan = plan.replace("supports = [[5, 4, 6]]\n", ring)
+    file.write_text(f"{plan}patches = {{roof = {{tension = 3.8, at = [[5.0, 6.64]]}}}}\n")
+    assert project.run(file).good
+
+
 @pytest.mark.parametrize(("x", "says"), [(1.2, "radius = 0.5"), (0.9, "too near to what is held beside it")])
 def test_a_ring_is_as_large_as_triangles_can_follow(tmp_path, x, says):
     path = tmp_path / "tent.toml"

@@ -220,6 +220,23 @@ def test_the_cloth_of_the_structural_model_is_the_one_that_is_cut(tmp_path):
             project.run(path)
 
 
+def test_seams_drawn_on_a_half_are_those_of_its_images(tmp_path):
+    """Before, the whole had them on one side alone: the other half was one strip. A seam that is its own
+    image, as across the mirror, is sewn once."""
+    half = "[plan]\nedge_length = 1.0\noutline = [[0, 0], [4, 0], [4, 6], [0, 6]]\ntension = 5.0\n"
+    half += "mirrors = [[[4, 0], [4, 6]]]\n"
+    seams = "[pattern]\nseams = [[[0, 3], [4, 3]], [[2, 0], [2, 3]]]\n"
+    path = tmp_path / "half.toml"
+    for whole, strips in ("", 3), ("whole = true\n", 4):
+        path.write_text(f'units = "m"\n{half}{seams}[output]\npattern = ["cloth.csv"]\n{whole}')
+        project.run(path)
+        assert len(pd.read_csv(tmp_path / "cloth.csv")) == strips
+    path.write_text(half + "[pattern]\nseams = [[[0, 3], [8, 3]]]\n")
+    command = ["pattern", str(path), "--whole", "--units", "m", "-o", str(tmp_path / "cloth.csv")]
+    assert main(command) == 0
+    assert len(pd.read_csv(tmp_path / "cloth.csv")) == 2
+
+
 def test_the_command_cuts_a_project(tmp_path, capsys):
     path = tmp_path / "hall.toml"
     path.write_text(PROJECT + "[pattern]\nwidth = 3.0\nstiffness = [600, 400]\n")

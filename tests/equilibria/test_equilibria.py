@@ -342,7 +342,7 @@ def test_wrong_input_is_refused():
         find_equilibria("roof.toml")
     with refused(OptionError, what="along", found=3):
         find_equilibria(cap, [3])
-    with refused(OptionError, what="what"):
+    with refused(OptionError, what="load or tension"):
         find_equilibria(cap, "pressures")
     with refused(OptionError, what="span"):
         find_equilibria(cap, span=(1.2, 1.5))
@@ -398,6 +398,29 @@ def test_minima_that_no_saddle_joins_are_named():
         "barrier from 1 to 2, 3: not known, as no saddle was found between them",
         "barrier from 1 to 4: not known, as no saddle was found between them",
     ]
+
+
+def test_branches_that_ended_alike_are_one_line(caps):
+    ended = "A branch ended at pressure {} as triangles collapse; what lies beyond on it is not known."
+    others = tuple(f"The {k} ways down from a saddle of index {k}: inflates ({k})." for k in (2, 3))
+    found = replace(caps[0], failed=(*map(ended.format, (0.8678, 1.179)), *others, ended.format(1.1)))
+    lines = found.text().splitlines()
+    assert [line for line in lines if "ended" in line] == [
+        "3 branches ended at pressure 0.8678, 1.179, 1.1 as triangles collapse; what lies beyond on them"
+        " is not known."
+    ]
+    assert {*others} <= {*lines}
+
+
+def test_a_way_that_the_solver_lost_is_no_way_out():
+    """Where it stalls, nobody knows what lies there; where the roof inflates, it has left the minimum."""
+    shapes = [(0, 0.0), (1, 1.0), (1, 2.0)]
+    found = tuple(SimpleNamespace(index=index, energy=energy) for index, energy in shapes)
+    lost = WayDown(2, 1), WayDown(2, None, "leads to no known end (stalled)")
+    out = WayDown(3, 1), WayDown(3, None, "inflates without bound")
+    both = Equilibria(found, (*lost, *out), (), {})
+    assert both.barrier(1) == 2.0
+    assert Equilibria(found, lost, (), {}).barrier(1) == np.inf
 
 
 def test_a_saddle_from_which_no_way_leads_to_a_minimum_is_named():

@@ -10,7 +10,7 @@ import pytest
 from asking import Client
 from browsing import until
 from scipy.spatial import cKDTree
-from small_project import HALL_WITH_ARCH
+from small_project import HALL_WITH_ARCH, PLACE
 
 import pcmc
 from generators import spherical_cap
@@ -79,11 +79,11 @@ def test_the_page_has_the_members_with_their_forces_at_every_state(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "suffix"),
-    [(HALL_WITH_ARCH.partition("[output]")[0], ".ifc"), (HALF, ".pcmc"), (HALF, ".glb")],
-    ids=["members", "whole", "whole, in metres"],
+    [(f"{HALL_WITH_ARCH}{PLACE}", ".ifc"), (HALF, ".pcmc"), (HALF, ".glb")],
+    ids=["members and a place on a map", "whole", "whole, in metres"],
 )
 def test_an_export_is_the_file_that_the_command_writes(tmp_path, text, suffix):
-    """With the members, and the whole roof where the project asks for it."""
+    """With the members and the place on a map, and the whole roof where the project asks for it."""
     roof = tmp_path / "hall.toml"
     roof.write_text(text)
     written = roof.with_suffix(suffix)

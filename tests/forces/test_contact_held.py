@@ -192,6 +192,42 @@ def test_strong_walls_that_cross_leave_a_roof_in_each_bay():
     assert "walls meet at resting vertex" in pcmc.verify(result.surface).reason
 
 
+def test_a_strong_wall_between_two_others_comes_down_too():
+    """No end of it is a corner, where top and bottom are one vertex."""
+    lines = [[4, 0], [4, 8]], [[8, 0], [8, 8]], [[4, 4], [8, 4]]
+    about = {"edge_length": 0.5, "tension": 2.0, "pressure": 0.4}
+    roof = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], [Divider(line, wall=2.5) for line in lines], **about)
+    result = pcmc.solve(roof.surface())
+    assert result.certificate.verdict is Verdict.STABLE
+    bays = [pcmc.solve(Plan([[0, 0], [4, 0], [4, y], [0, y]], **about).surface()).energy for y in (4, 8)]
+    assert result.energy == pytest.approx(2.0 * sum(bays), rel=5e-4)
+
+
+def test_a_strong_wall_comes_down_on_a_sloped_bottom(tmp_path):
+    """Of a tilted plan: a roof in each bay, on finer meshes, too, proved, and read again from a file."""
+    about = {"edge_length": 0.8, "tension": 2.0, "pressure": 0.4}
+
+    def tilted(points):
+        return [[x, y, 0.2 * x - 0.1 * y] for x, y in points]
+
+    strong = Divider([[6, 0], [6, 8]], wall=2.5, bottom="sloped")
+    roof = pcmc.solve(Plan(tilted([[0, 0], [12, 0], [12, 8], [0, 8]]), [strong], **about).surface())
+    assert roof.certificate.verdict is Verdict.STABLE
+    part = standing_part(roof.surface)
+    np.testing.assert_array_equal(part.resting, part.walls.top_free)
+    pull, capacity = pull_and_capacity(part.surface, part.walls, part.resting)
+    count = part.resting.sum()
+    assert capacity.sum() == pytest.approx(2.5 * np.hypot(8.0, 0.8) * count / (count + 1), rel=1e-12)
+    assert (np.abs(pull) <= capacity).all()
+    sides = [tilted([[x, 0], [x + 6, 0], [x + 6, 8], [x, 8]]) for x in (0, 6)]
+    bays = [pcmc.solve(Plan(side, **about).surface()).energy for side in sides]
+    assert roof.energy == pytest.approx(sum(bays), rel=1e-3)
+    assert pcmc.check_mesh(roof).persists
+    assert pcmc.verify(roof.surface).proved
+    pcmc.write(tmp_path / "a.pcmc", roof)
+    assert certify(pcmc.read(tmp_path / "a.pcmc")).verdict is Verdict.STABLE
+
+
 def test_a_wall_that_stands_on_one_vertex_pulls_up_none_of_those_beside_it():
     """Its triangle spans from one resting vertex to the next, over the bottom that neither lifts with it."""
     cross = [Divider(line, wall=1.2) for line in ([[6, 0], [6, 8]], [[0, 4], [12, 4]])]

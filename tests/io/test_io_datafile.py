@@ -55,6 +55,16 @@ def test_foreign_datafile(tmp_path):
     assert surface.pressures.tolist() == [0.25, -0.75]  # of two bodies on its two sides
 
 
+def test_the_edges_of_a_patch_that_lies_on_the_plane_slide_on_it(tmp_path):
+    """Surface Evolver refines it as pcmc does: five vertices on the ground, and eight edges."""
+    X = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, 0]]
+    F = [[k, (k + 1) % 4, top] for top in (4, 5) for k in range(4)]
+    patches = [pcmc.Patch("drop", 1.0), pcmc.Patch("ground", 0.5, pressure=0.0)]
+    drop = pcmc.Surface(X, F, [0] * 4 + [1] * 4, patches, on_plane=[0, 1, 2, 3, 5])
+    pcmc.write(tmp_path / "a.fe", drop)
+    assert (tmp_path / "a.fe").read_text().count(" constraint 1\n") == 5 + 8
+
+
 FE = {
     "no faces": ("faces\n", "facettes\n", "faces", "no faces section"),
     "a word": ("20  side 0", "20  sid 0", 10, r"'sid' \('sid' is not a number, a parameter"),

@@ -136,9 +136,10 @@ def test_the_whole_of_a_half_is_shown_listed_and_kept(folder):
 
 def test_targets_of_a_half_say_that_they_are_the_half_s(folder):
     text = HALF + '[targets]\nmeet = [{quantity = "area", value = 27.0}]\nvary = ["roof"]\n'
-    Path("half.toml").write_text(text + "[output]\nwhole = true\n", encoding="utf-8")
-    notes = project.designed("half.toml").notes
-    assert "targets of areas, volumes and lengths are those of the part between the mirror planes" in notes
+    said = "targets of areas, volumes and lengths are those of the part between the mirror planes"
+    for whole in (True, False, True):  # also of a roof that was kept when the project asked for the other
+        Path("half.toml").write_text(text + f"[output]\nwhole = {str(whole).lower()}\n", encoding="utf-8")
+        assert (said in project.designed("half.toml").remarks) == whole
 
 
 def test_a_value_given_for_what_the_targets_decide_is_named(folder):

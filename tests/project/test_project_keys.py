@@ -10,11 +10,13 @@ from pathlib import Path
 import ifcopenshell
 import pytest
 from refusals import refused
-from small_project import changed
+from small_project import PLACE, changed
 
+import pcmc
 from pcmc import cli
-from pcmc.base.errors import FileError, PcmcError
-from pcmc.project import load, reference, run, sections
+from pcmc.base.errors import FileError, OptionError, PcmcError
+from pcmc.io import Georeference
+from pcmc.project import build, load, reference, run, sections
 
 
 @pytest.mark.parametrize(
@@ -325,15 +327,28 @@ def test_meanings_speak_of_the_file_and_not_of_python():
             assert found is None, f"{section.name}.{key.name}: {key.help}"
 
 
-PLACE = '[output.georeference]\ncrs = "EPSG:25832"\neastings = 691000.0\n'
-
-
 def test_the_place_on_a_map_is_in_the_file_of_ifc_alone(small):
     changed(small, '"roof.obj"]', '"roof.obj", "roof.ifc"]\n' + PLACE)
     files = run(small).files
     model = ifcopenshell.open(next(path for path in files if path.suffix == ".ifc"))
     [conversion] = model.by_type("IfcMapConversion")
     assert (conversion.Eastings, conversion.Northings, conversion.XAxisAbscissa) == (691e3, 0.0, 1.0)
+
+
+def test_a_plan_drawn_on_the_map_is_not_put_there_a_second_time(small):
+    """Eastings that its coordinates have, too; in other units as well, and in what Python writes."""
+    changed(small, '"roof.obj"]', '"roof.ifc"]\n' + PLACE)
+    x = [round(value / 0.3048) for value in (691_010.0, 691_014.0)]
+    outline = f"outline = [[{x[0]}, 7], [{x[1]}, 7], [{x[1]}, 10], [{x[0]}, 10]]"
+    changed(small, "outline = [[0, 0], [4, 0], [4, 3], [0, 3]]", outline)
+    small.write_text('units = "ft"\n' + small.read_text())
+    twice = "eastings = 691000: the surface is at x = 691012 m itself, and would be at twice the place;"
+    with pytest.raises(OptionError, match=re.escape(f"{twice} leave eastings out, or draw it near [0, 0]")):
+        run(small)
+    with pytest.raises(FileError, match=f"a.ifc: {twice}"):
+        pcmc.write(
+            small.parent / "a.ifc", build(small), units="ft", georeference=Georeference("EPSG:25832", 691e3)
+        )
 
 
 @pytest.mark.parametrize(
@@ -358,6 +373,11 @@ def test_the_place_on_a_map_is_in_the_file_of_ifc_alone(small):
             '"roof.obj"]',
             '"roof.ifc"]\ngeoreference = {crs = "EPSG:25832", east = 1}',
             "did you mean 'eastings'?",
+        ),
+        (
+            '"roof.obj"]',
+            f'"roof.ifc"]\n{PLACE}rotation = inf',
+            "line 15: output.georeference: rotation: expected a finite number, found inf",
         ),
     ],
 )

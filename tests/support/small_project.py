@@ -40,6 +40,7 @@ young = 2.1e8
 files = ["hall.ifc", "hall.obj"]
 drawings = ["hall.dxf"]
 """
+PLACE = '[output.georeference]\ncrs = "EPSG:25832"\neastings = 691000.0\n'
 
 
 def changed(path, old, new):
