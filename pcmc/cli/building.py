@@ -81,7 +81,9 @@ def structure(
                     for name, table in values["patches"].items()
                 }
             one = set(thick.values()) if len(thick) == len(patches) else ()
-            values["thickness"] = thick[patches[0]] if len(one) == 1 else thick  # one number, not one by patch
+            values["thickness"] = (
+                thick[patches[0]] if len(one) == 1 else thick
+            )  # one number, not one by patch
         if given.wind:
             values["wind"] = values.get("wind", {}) | arguments.by_name(patches, given.wind, "--wind")
         wanted = Structure(**values)

@@ -296,8 +296,8 @@ class Structure:
                 if not (plane.mirror and len(area)) or in_area(area, surface, plane).any():
                     continue  # what goes on behind the plane, the part refuses, or has the same
                 if in_area(area, surface).any():
-                    text = f"{zone['case']}: its area is on one side of the {plane}, and the whole has it there"
-                    text += " alone; if its image is meant, too, draw it"
+                    text = f"{zone['case']}: its area is on one side of the {plane}, and the whole has it"
+                    text += " there alone; if its image is meant, too, draw it"
                     warnings.warn(text, LoadWarning, stacklevel=3)
             return self.of_whole(surface, whole, plan).check(whole, plan)
         self.thicknesses(surface)
