@@ -76,12 +76,14 @@ def structure(
             if project.structure is not None:
                 own = project.structure.thicknesses(start)
                 thick = (own if isinstance(own, dict) else dict.fromkeys(patches, own)) | thick
-                tables = values["patches"].items()  # their own would count for more
-                values["patches"] = {k: {**table, "thickness": thick[k]} for k, table in tables}
-            even = (
-                set(thick) == set(patches) and len(set(thick.values())) == 1
+                values["patches"] = {  # their own would count for more
+                    name: {key: value for key, value in table.items() if key != "thickness"}
+                    for name, table in values["patches"].items()
+                }
+            one = set(thick.values()) if len(thick) == len(patches) else ()
+            values["thickness"] = (
+                thick[patches[0]] if len(one) == 1 else thick
             )  # one number, not one by patch
-            values["thickness"] = thick[patches[0]] if even else thick
         if given.wind:
             values["wind"] = values.get("wind", {}) | arguments.by_name(patches, given.wind, "--wind")
         wanted = Structure(**values)
