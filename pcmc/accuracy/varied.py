@@ -33,7 +33,7 @@ class Varied:
     def of(cls, surface: Surface, what: str, towards: str | None = None) -> Varied:
         """What a text names on a surface. Errors as ``margin``."""
         known = named(surface)
-        parts = known[validate.choice("what", what, [*known])]
+        parts = known[validate.choice("load or tension", what, [*known])]
         walls = [surface.patches[k].name for k in np.flatnonzero(surface.walls)]
         pulls = any(kind == "cable" or (kind == "tension" and name not in walls) for kind, name in parts)
         more = not pulls

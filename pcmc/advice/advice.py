@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import toml, toml_key
-from ..base.errors import OptionError
+from ..base.errors import OptionError, PcmcError
 from ..base.units import Units
 from ..certificate.balance import strained_junction
 from ..certificate.certificate import Certificate
@@ -172,7 +173,8 @@ def firmer_walls(plan: Plan, surface: Surface, rises: Sequence[Rise]) -> Iterato
     walls = {divider.name for divider in plan.dividers if divider.wall is not None}
     strong = [with_dividers(plan, walls, wall=two_digits(times * most)) for times in STRONG if walls]
     for other in filter(None, (with_upright(plan), *strong)):
-        yield other, rises, changes(plan, other)
+        with suppress(PcmcError):  # a plan that has no mesh is no advice
+            yield other, rises, changes(plan, other)
 
 
 def flatter(plan: Plan, rises: Sequence[Rise]) -> Iterator[Change]:

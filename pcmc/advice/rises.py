@@ -196,6 +196,15 @@ class Mast:
         steep = abs(self.height) / self.clearance
         return next((share for share in SHARES if share * math.acosh(1.0 / share) >= steep), SHARES[-1])
 
+    @property
+    def top(self) -> Floats:
+        """(3,) the centre of a ring around it: the point, or nearer to the roof if no ring can be so high."""
+        most = SHARES[-1] * math.acosh(1.0 / SHARES[-1]) * self.clearance
+        over = self.height - float(np.clip(self.height, -most, most))
+        x, y, z = self.point.tolist()
+        digits = 1 - math.floor(math.log10(most))  # two of the height over the roof, wherever that is
+        return np.array([x, y, round(z - over, digits) if over else z])
+
     def radius(self, share: float) -> float:
         """The radius of a ring around it."""
         return two_digits(max(share * self.clearance, self.least))
@@ -250,9 +259,23 @@ def with_rings(plan: Plan, masts: Sequence[Mast], share: float) -> Plan:
     """The plan with a held ring around each point instead of the point."""
     left_out = {mast.number for mast in masts}
     supports = [s for k, s in enumerate(plan.supports) if k not in left_out]
-    circles = [{"circle": {"centre": mast.point.tolist(), "radius": mast.radius(share)}} for mast in masts]
+    circles = [{"circle": {"centre": mast.top.tolist(), "radius": mast.radius(share)}} for mast in masts]
     rings = [Hole(circle, name=f"mast {number}") for number, circle in enumerate(circles, 1)]
-    return replace(plan, supports=supports, holes=[*plan.holes, *rings])
+    patches = [replace(area, at=_beside(area.at, masts, share)) for area in plan.patches]
+    return replace(plan, supports=supports, holes=[*plan.holes, *rings], patches=patches)
+
+
+def _beside(at: Any, masts: Sequence[Mast], share: float) -> Any:
+    """The points that name a patch; those inside a ring are moved out of it."""
+    if at is None:
+        return None
+    points = np.array(at, dtype=float).reshape(-1, 2)
+    for centre, radius in [(mast.point[:2], mast.radius(share)) for mast in masts]:
+        away = points - centre
+        angle = np.arctan2(away[:, 1], away[:, 0])[:, None]
+        out = centre + 1.2 * radius * np.hstack([np.cos(angle), np.sin(angle)])
+        points = np.where(np.linalg.norm(away, axis=1)[:, None] < 1.1 * radius, out, points)
+    return points.round(6).tolist() if np.any(points != np.reshape(at, (-1, 2))) else at
 
 
 def ring_lines(masts: Sequence[Mast], share: float, *, drawn: bool) -> list[str]:
@@ -260,7 +283,7 @@ def ring_lines(masts: Sequence[Mast], share: float, *, drawn: bool) -> list[str]
     lines = []
     for number, mast in enumerate(masts, 1):
         radius = f"{mast.radius(share):g}"
-        x, y, z = (f"{value:.10g}" for value in mast.point)
+        x, y, z = (f"{value:.10g}" for value in mast.top)
         if drawn:
             lines.append(f"draw a circle of radius {radius} around ({x}, {y}) at height {z} on layer 'mast'")
             lines.append(f"delete the point or line at ({x}, {y}) there")
@@ -283,6 +306,8 @@ def mast_note(plan: Plan, *, drawn: bool = False) -> str:
         if drawn
         else f"hold it on a ring, in [[plan.holes]], instead: {ring[2]}"
     )
+    if (high := masts[0]).top[2] != high.point[2]:
+        change += "; no ring can be as high as the point"
     if cut := [mast for mast in masts if mast.in_mirror]:  # the outline is to leave out its half
         radius = f"of radius {cut[0].radius(cut[0].share):g} around {cut[0].text}"
         change = f"hold it on a ring instead: lead the outline around it on an arc {radius},"

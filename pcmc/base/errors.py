@@ -90,6 +90,10 @@ class CurveWarning(UserWarning):
     """Held vertices were moved off the curves that they were drawn on."""
 
 
+class LoadWarning(UserWarning):
+    """A load is taken as it is drawn, and may be meant otherwise."""
+
+
 class SweepError(PcmcError):
     """The executor, scheduler or workers of a sweep failed; the cases stored before are safe."""
 

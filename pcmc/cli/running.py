@@ -15,7 +15,8 @@ from ..base.interrupts import termination_as_interrupt
 from ..base.libraries import require
 from . import BAD_INPUT, INTERRUPTED, NOT_CERTIFIED, OK
 
-SHOWN = (errors.BalanceWarning, errors.FileWarning, errors.FreeSurfaceWarning, errors.PlanWarning)
+SHOWN = (errors.BalanceWarning, errors.FileWarning, errors.FreeSurfaceWarning, errors.LoadWarning)
+SHOWN += (errors.PlanWarning,)
 FAILING = ("strict", "surrogateescape", "backslashreplace")  # error handlers; the second is the locale C's
 SIGNS = "²³±°×·≥≤–…→αλΠ"  # of the field
 TYPED = "^2|^3|+-| deg|x|*|>=|<=|-|...|->|alpha|lambda|Pi"  # each as one types it in ASCII
@@ -27,7 +28,13 @@ def run_command(arguments: list[str]) -> int:
     with warnings.catch_warnings(action="ignore"):
         for kind in SHOWN:
             warnings.simplefilter("always", kind)
-        warnings.showwarning = lambda message, *_, **__: _say(f"note: {message}")
+        said = dict[str, None]()
+
+        def tell(message: Warning | str, *_: object, **__: object) -> None:
+            if str(message) not in said:
+                said[str(message)] = _say(f"note: {message}")
+
+        warnings.showwarning = tell
         # letters that an encoding lacks as one types them (m^2), others as \xf6: printing never fails
         codecs.register_error("pcmc.plain", _plain)
         for stream in (sys.stdout, sys.stderr):

@@ -24,6 +24,7 @@ from ..surface import Cable, HeldCurve, Patch, Surface
 from ..surface.curves import Curve, polyline
 from ..surface.geometry import bounding_size
 from ..surface.pieces import Piece, point_text, to_space
+from ..surface.supports import by_planes, common_point, members
 from ..surface.values import BELOW
 from .draft import Draft, Roof, drafted, rooms_between, upright_planes, walls_of
 from .edges import NONE, check_pressures, edge_cables, mirror_planes, raised_heights, usual_cable
@@ -77,6 +78,12 @@ def build_surface(plan: Plan) -> Surface:
     roof = Roof(to_space(raised, plan.plane), base, fixed, laws, room_of_face)
     walls, wall_patches, sides = walls_of(draft, roof)
     vertices = np.concatenate([roof.positions, walls.vertices])
+    uprights = upright_planes(draft, walls, sides)
+    planes = (*mirror_planes(plan, vertices), *uprights)
+    # where a line ends on an upright one, its end may be off it by the digits that were typed
+    moved = members(uprights, len(vertices)) & ~np.pad(fixed, (0, len(walls.vertices)))
+    for meeting, rows in by_planes(planes, moved):
+        vertices[rows] = [common_point(place, meeting) for place in vertices[rows]]
     surface = Surface(
         vertices,
         np.concatenate([mesh.triangles, walls.faces]),
@@ -85,7 +92,7 @@ def build_surface(plan: Plan) -> Surface:
         np.concatenate([fixed, walls.fixed]),
         np.concatenate([sliding, walls.sliding]),
         plan.plane,
-        on_planes=(*mirror_planes(plan, vertices), *upright_planes(draft, walls, sides)),
+        on_planes=planes,
         cables=tuple(cables),
         rooms=tuple(rooms_between(plan, wall_patches, sides)),
         curves=(*held_lines(draft, vertices, walls.feet), *walls.uprights),

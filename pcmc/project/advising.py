@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from ..advice.advice import changes, coarse, firmer_walls, flatter, improved, loosened, lower_lines
 from ..advice.rises import SHARES, as_sail, point_masts, ring_lines, take_rises, with_rings, with_rises
+from ..base.arrays import toml, toml_key
 from ..base.errors import PcmcError
 from ..certificate.balance import strained_junction
 from ..design import Target
@@ -92,6 +93,11 @@ def _mended(project: Project, plan: Plan, outcome: Outcome) -> Mended:
         if trial is None or not trial.good or (masts and not _holds(trial)):
             continue
         rings = ring_lines(masts, share, drawn=project.drawing is not None)
+        for old, new in zip(plan.patches, changed.patches, strict=True) if project.drawing is None else ():
+            if old.at != new.at:  # it was inside a ring
+                rings.append(
+                    f"[plan.patches] {toml_key(new.name)}: at = {toml(new.at)}  (now {toml(old.at)})"
+                )
         return Mended(changed, True, sail is not None, rings)
     better, certificate = plan, outcome.certificate
     for _ in range(TRIES):

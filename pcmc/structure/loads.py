@@ -11,7 +11,7 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Bools, Floats
 from ..base.errors import OptionError, unknown
-from ..surface import Surface
+from ..surface import Plane, Surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
 from ..surface.images import leaning_mirrors
@@ -264,11 +264,9 @@ def _in_zone(load: Snow | Wind, surface: Surface) -> Bools:
     (least, most), slope = load.slopes, roof_slopes(surface)
     chosen: Bools = ((slope > least + 1e-9) | (least == 0.0)) & (slope <= most + 1e-9)
     if len(load.area):
-        middle = surface.vertices[surface.faces].mean(axis=1)
-        here = _within(load.area, surface.plane.to_local(middle))
+        here = in_area(load.area, surface)
         for mirror in (plane for plane, _ in surface.on_planes if plane.mirror):
-            image = middle - 2.0 * mirror.height(middle)[:, None] * np.array(mirror.normal)
-            there = _within(load.area, surface.plane.to_local(image))
+            there = in_area(load.area, surface, mirror)
             if there.any() and (there != here).any():
                 text = f"{load.name}: its area goes on behind the {mirror}, and is another one there; let it"
                 text += " end at the mirror, or take the whole roof: --whole, or pcmc.mirrored(surface)"
@@ -278,6 +276,14 @@ def _in_zone(load: Snow | Wind, surface: Surface) -> Bools:
         text = f"{load.name}: no triangle has its middle in the area and its slope in {[least, most]}"
         raise OptionError(f"{text}; check the zone", what=load.name)
     return chosen
+
+
+def in_area(area: Sequence[Sequence[float]], surface: Surface, behind: Plane | None = None) -> Bools:
+    """(m,) the faces whose middle, or whose image ``behind`` a plane, is in a polygon of the plan."""
+    middle = surface.vertices[surface.faces].mean(axis=1)
+    if behind is not None:
+        middle = middle - 2.0 * behind.height(middle)[:, None] * np.array(behind.normal)
+    return _within(area, surface.plane.to_local(middle))
 
 
 def _within(area: Sequence[Sequence[float]], places: Floats) -> Bools:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 from ..base import validate
-from ..base.errors import OptionError, unknown
+from ..base.errors import LoadWarning, OptionError, unknown
 from ..plan import Plan
 from ..plan.parts import check_keys, curve_of
 from ..surface import Surface
@@ -16,7 +18,7 @@ from ..surface.parts import image_names, with_images
 from ..surface.symmetry import mirrored
 from ..surface.values import in_the_open
 from .gas import Gas
-from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads
+from .loads import STEEPEST, Load, SelfWeight, Snow, Wind, check_combinations, check_loads, in_area
 from .material import Material, Profile
 from .members import ENDS, KINDS, Member, bars_on, lines_on
 from .model import StructuralModel, checked_areas, checked_thickness
@@ -289,6 +291,14 @@ class Structure:
         ``unfold``, before it is solved."""
         if unfold:
             whole = mirrored(surface)
+            for zone, (plane, _) in product(self.zones, surface.on_planes):
+                area = zone.get("area", ())
+                if not (plane.mirror and len(area)) or in_area(area, surface, plane).any():
+                    continue  # what goes on behind the plane, the part refuses, or has the same
+                if in_area(area, surface).any():
+                    text = f"{zone['case']}: its area is on one side of the {plane}, and the whole has it"
+                    text += " there alone; if its image is meant, too, draw it"
+                    warnings.warn(text, LoadWarning, stacklevel=3)
             return self.of_whole(surface, whole, plan).check(whole, plan)
         self.thicknesses(surface)
         self.materials(surface)

@@ -59,7 +59,7 @@ class Supports(NamedTuple):
                 fixed |= leaves
                 lines[number] = guide, along & ~leaves
             several = (np.sum([mask for _, mask in planes], axis=0) > 1) & ~self.fixed & ~self.guided
-            for meeting, rows in _by_planes(planes, several):
+            for meeting, rows in by_planes(planes, several):
                 rank, line = _common_line(meeting, int(rows[0]))
                 along = mask_of(rows, len(fixed))
                 if rank == 3:
@@ -321,7 +321,7 @@ def symmetric_part(planes: Sequence[tuple[Plane, Bools]], vectors: Floats) -> Fl
     Of the whole surface the sum over the images of a vector is this part, times their number.
     """
     mirrors = [(plane, mask) for plane, mask in planes if plane.mirror]
-    for inside, rows in _by_planes(mirrors, members(mirrors, len(vectors))):
+    for inside, rows in by_planes(mirrors, members(mirrors, len(vectors))):
         _, sizes, directions = np.linalg.svd([plane.normal for plane in inside], full_matrices=False)
         across = directions[sizes > PARALLEL]
         vectors[rows] -= vectors[rows] @ across.T @ across
@@ -359,8 +359,8 @@ def common_point(point: Floats, planes: Sequence[Plane]) -> Floats:
     return point
 
 
-def _by_planes(planes: Sequence[tuple[Plane, Bools]], chosen: Bools) -> Iterator[tuple[list[Plane], Ints]]:
-    """The chosen vertices (n,) by the planes that they lie on."""
+def by_planes(planes: Sequence[tuple[Plane, Bools]], chosen: Bools) -> Iterator[tuple[list[Plane], Ints]]:
+    """The chosen vertices (n,) by the planes that they lie on: these, and the vertices' numbers."""
     rows = np.flatnonzero(chosen)
     if not len(rows):
         return

@@ -99,7 +99,8 @@ def test_a_margin_of_what_is_0_now_is_a_value_with_its_unit(cap):
 
 def test_an_unknown_name_is_refused_before_solving(roof, capsys):
     assert main(["solve", str(changed(roof, '"pressure"', '"presure"'))]) == 2
-    assert "roof.toml: line 9: unknown what 'presure'; did you mean 'pressure'?" in capsys.readouterr().err
+    text = "roof.toml: line 9: unknown load or tension 'presure'; did you mean 'pressure'?"
+    assert text in capsys.readouterr().err
 
 
 @pytest.mark.nightly

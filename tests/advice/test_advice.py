@@ -419,3 +419,14 @@ def test_a_roof_that_finer_meshes_lose_gets_a_wall_with_which_they_hold_it(tmp_p
     printed = capsys.readouterr().out
     assert "persists: finer meshes have the same surface" in printed
     assert "type in" not in printed
+
+
+def test_advice_that_has_no_mesh_is_left_out(monkeypatch):
+    """Here an upright wall along a bent line; the wall that is stronger is proposed all the same."""
+    outline = [[0, 0], [12, 0], [12, 8], [0, 8]]
+    plan = Plan(outline, [Divider([[6, 0], [6, 8]], wall=1.0)], edge_length=2.0, tension=5.0)
+    bent = Divider([[6, 0], [7, 4], [6, 8]], wall=1.0, upright=True)
+    monkeypatch.setattr("pcmc.advice.advice.with_upright", lambda plan: replace(plan, dividers=[bent]))
+    found = list(firmer_walls(plan, plan.surface(), ()))
+    assert found
+    assert not any(divider.upright for plan, _, _ in found for divider in plan.dividers)

@@ -217,6 +217,13 @@ def test_forces_at_points_are_blue():
     assert near(image, rgb("#B2182B")).sum() > 100
 
 
+def test_moments_that_cancel_along_lines_are_zero():
+    """A flat sheet pulls on its rim and on a ring, each in balance with itself, and no load has a size."""
+    ring = {"circle": {"centre": [30, 20], "radius": 5}}
+    flat = Plan([[0, 0], [60, 0], [60, 40], [0, 40]], [], [ring], edge_length=3.0, tension=0.3, pressure=0.0)
+    assert not pcmc.certify(pcmc.solve(flat.surface()).surface).balance[[*FORCE, *MOMENT]].to_numpy().any()
+
+
 def test_forces_of_a_rim_that_cancel_are_zero():
     """Both sheets of a cushion pull on its rim inwards alone, and all around."""
     cushion = pcmc.solve(Plan([[0, 0], [6, 0], [6, 4], [0, 4]], tension=3.0, cushion=1.0).surface()).surface

@@ -104,6 +104,25 @@ def test_forces_at_masts_have_arrows_with_a_scale_of_their_own(driver):
         running.close()
 
 
+def test_the_table_of_patches_with_snow_fits_its_panel(driver):
+    driver.set_window_size(1280, 860)
+    patches = {name: {"tension": 6.0, "weight": 0.05} for name in ("west", "east")}
+    plan = Plan(
+        [[0, 0], [12, 0], [12, 8], [0, 8]],
+        [[[6, 0], [6, 8]]],
+        edge_length=1.5,
+        snow=0.25,
+        patches=patches,
+    )
+    running = explore.start(plan.surface(), units=Units("m", "kN"))
+    try:
+        parts = Explored(driver, running.url).find("#parts")
+        assert "Net p" in parts.text
+        assert parts.get_property("scrollWidth") <= parts.get_property("clientWidth")
+    finally:
+        running.close()
+
+
 def test_colours_come_with_their_scale(page):
     before = page.picture()
     assert not page.find("#legend").is_displayed()

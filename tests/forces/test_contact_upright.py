@@ -28,7 +28,7 @@ def test_a_strong_upright_wall_comes_down_as_any_other():
     # one line holds the junction, and the plane nothing
     rows = [result.certificate.supports[["name", "kind"]].to_numpy().tolist() for result in (upright, free)]
     assert rows[0] == rows[1]
-    assert rows[0][-1] == ["west | east | wall 1, inside", "line"]
+    assert rows[0][-1] == ["west | east | wall 1", "line"]
 
 
 def test_the_plane_of_an_upright_wall_takes_the_pull_across_it():

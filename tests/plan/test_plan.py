@@ -377,3 +377,17 @@ def test_a_corner_that_touches_a_line_cuts_it():
     longest = np.max([np.sum((B - A) ** 2, axis=1), np.sum((C - B) ** 2, axis=1)], axis=0)
     assert (signed_areas(mesh.points, mesh.triangles) > 0.05 * longest).all()
     assert mesh.region.max() == 1
+
+
+def test_a_line_ends_on_an_upright_one_by_the_digits_that_were_typed():
+    """The end is 1e-5 beside the slanted line; top and bottom there are in the wall's plane all the same."""
+    lines = [[[17.7394, 3.2791], [11.9906, 4.7587]], [[14.0261, 4.2348], [13.7095, 0.0]]]
+    dividers = [Divider(lines[0], wall=0.6, upright=True), Divider(lines[1], wall=0.7)]
+    outline = [[12.01, 0], [17.72, 0], [17.72, 6.54], [12.01, 6.54]]
+    surface = Plan(outline, dividers, edge_length=0.6, tension=3.0).surface()
+    [(plane, mask)] = surface.on_planes
+    end = np.linalg.norm(surface.vertices[:, :2] - lines[1][0], axis=1) < 1e-4
+    assert end.sum() >= 2
+    assert mask[end & ~surface.fixed].all()
+    assert np.abs(plane.height(surface.vertices[end])).max() < 1e-12
+    assert solve(surface).converged

@@ -12,7 +12,7 @@ from refusals import refused
 
 import pcmc
 from generators.grid import grid_faces
-from pcmc import Cable, Material, Patch, Plane, SelfWeight, Snow, StructuralModel, Surface, Wind
+from pcmc import Cable, Material, Patch, Plane, SelfWeight, Snow, StructuralModel, Surface, Wind, cli
 from pcmc.base.errors import LostWarning, OptionError
 from pcmc.drawings.views import model_curves
 from pcmc.plan import Plan
@@ -267,6 +267,30 @@ def test_a_line_in_a_mirror_is_drawn_as_no_rim():
     ends = half.vertices[half.topology.edges[half.mirror_edge]]
     assert 2.0 * lengths[0]["PCMC-RIM"] == pytest.approx(lengths[1]["PCMC-RIM"])
     assert lengths[0]["PCMC-MIRROR"] == pytest.approx(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+
+
+@pytest.mark.parametrize(("east", "told"), [(3.0, True), (5.0, True), (8.0, False), (10.0, False)])
+def test_a_zone_on_one_side_alone_is_named_in_the_whole(east, told):
+    """In the part it acts on the images, too; without a word the whole had half of the drift. The part
+    refuses one that goes on behind the mirror, and is another one there."""
+    half, _ = halves()
+    zone = {"case": "drift", "snow": 0.3, "area": [[0, 0], [east, 0], [east, 3], [0, 3]]}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        Structure(young=5e5, thickness=1e-3, zones=[zone], cable_area=1e-4).check(half, unfold=True)
+    assert ["drift: its area is on one side" in str(warning.message) for warning in caught] == [True] * told
+
+
+def test_the_command_names_such_a_zone_once(tmp_path, capsys):
+    path = tmp_path / "half.toml"
+    path.write_text(
+        "[plan]\nedge_length = 1.0\noutline = [[0, 0], [4, 0], [4, 6], [0, 6]]\ntension = 5.0\n"
+        "mirrors = [[[4, 0], [4, 6]]]\n[structure]\nyoung = 5e5\nthickness = 0.001\n"
+        'zones = [{case = "drift", wind = 0.1, area = [[0, 0], [4, 0], [4, 6], [0, 6]]}]\n'
+        '[output]\nstructure = "half.inp"\nwhole = true\n'
+    )
+    assert cli.main(["structure", str(path), "-o", str(tmp_path / "roof.inp"), "--no-cache"]) == 0
+    assert capsys.readouterr().err.count("drift: its area is on one side of the mirror plane") == 1
 
 
 def test_the_volume_of_a_gas_is_that_of_the_part():
