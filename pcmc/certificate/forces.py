@@ -319,17 +319,17 @@ def _unit(v: Any) -> tuple[Any, Any]:
 
 
 def cable_parts(surface: Surface) -> list[tuple[Cable, EdgeCurve]]:
-    """The parts of each cable of tension > 0 between its ends, branches and the supports in between.
+    """The parts of each cable of tension > 0 between its ends, branches, other cables, and the supports in
+    between.
 
     A support in between is a mast that it runs over: a fixed vertex beside one that moves.
     """
-    parts = []
+    parts, meeting = [], np.bincount(surface.cable_edges.ends.ravel(), minlength=surface.n) > 2
     for cable in surface.cables:
         if cable.tension > 0.0:
-            mast = np.zeros(surface.n, dtype=bool)
-            leading = cable.edges[surface.fixed[cable.edges].sum(axis=1) == 1]
-            mast[leading] = surface.fixed[leading]
-            parts += [(cable, curve) for curve in surface.topology.chains(cable.edges, mast)]
+            leading, kink = cable.edges[surface.fixed[cable.edges].sum(axis=1) == 1], meeting.copy()
+            kink[leading] |= surface.fixed[leading]
+            parts += [(cable, curve) for curve in surface.topology.chains(cable.edges, kink)]
     return parts
 
 
