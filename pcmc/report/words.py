@@ -55,7 +55,7 @@ def verdict_sentences(
     sentences.append(f"The forces left are {small(certificate.residual)} of the forces in the roof.")
     if certificate.index is not None:
         up_to = f", up to {small(certificate.curvature_error)} of it" * (certificate.curvature_error > 0.0)
-        asked = "Each patch has the mean curvature that its tension and pressure ask for"
+        asked = "By its forces each patch has the mean curvature that its tension and pressure ask for"
         sentences.append(f"{asked}{up_to}.")
         share = f"{100.0 * certificate.load_ratio:.0f} %"
         if share != "0 %":  # as in a cushion, whose sheets are pushed apart

@@ -158,8 +158,8 @@ def test_the_verdict_in_words(caps):
     _, *sentences = words.verdict_sentences(certificate)
     assert sentences[:2] == ["In detail: a reason.", "The forces left are 3e-12 of the forces in the roof."]
     of_curvature, of_load, balance = sentences[2:]
-    assert of_curvature.startswith("Each patch has the mean curvature")
     assert certificate.curvature_error == 0.0
+    assert of_curvature.startswith("By its forces each patch has the mean curvature")
     assert of_curvature.endswith("tension and pressure ask for.")
     bent = pcmc.certify(caps)
     assert f" up to {tables.small(bent.curvature_error)} of it." in words.verdict_sentences(bent)[2]
