@@ -338,7 +338,7 @@ def test_the_place_on_a_map_is_in_the_file_of_ifc_alone(small):
 
 
 def test_a_plan_drawn_on_the_map_is_not_put_there_a_second_time(small):
-    """Eastings that its coordinates have, too, or a height; in other units as well, and in what Python writes."""
+    """Eastings, or a height, that it has already; in other units as well, and in what Python writes."""
     changed(small, '"roof.obj"]', '"roof.ifc"]\n' + PLACE)
     x = [round(value / 0.3048) for value in (691_010.0, 691_014.0)]
     outline = f"outline = [[{x[0]}, 7], [{x[1]}, 7], [{x[1]}, 10], [{x[0]}, 10]]"
