@@ -1,6 +1,7 @@
 """Walls with held bottoms that pinch: a junction that comes down rests on the curve of its bottom."""
 
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from pcmc.forces.pinching import (
     standing_part,
     top_spacing,
 )
-from pcmc.forces.wall_rows import find_walls
+from pcmc.forces.wall_rows import _held_feet, find_walls
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Divider, Plan
@@ -201,6 +202,16 @@ def test_a_strong_wall_between_two_others_comes_down_too():
     assert result.certificate.verdict is Verdict.STABLE
     bays = [pcmc.solve(Plan([[0, 0], [4, 0], [4, y], [0, y]], **about).surface()).energy for y in (4, 8)]
     assert result.energy == pytest.approx(2.0 * sum(bays), rel=5e-4)
+
+
+def test_a_wall_whose_bottom_has_a_gap_has_no_feet():
+    """As many vertices above as below do not pair them: a bottom in two pieces has four ends, the top two."""
+    rows = np.array([[[x, 0.0, z] for x in range(5)] for z in (1.0, 0.0)]).reshape(-1, 3)
+    wall = SimpleNamespace(n=10, on_planes=(), vertices=rows)
+    top, bottom = np.array([[0, 1], [1, 2], [2, 3], [3, 4]]), np.array([[5, 6], [7, 8], [8, 9]])
+    assert _held_feet(wall, top, top + 5).tolist() == [5, 6, 7, 8, 9, *[-1] * 5]
+    assert _held_feet(wall, top, bottom) is None
+    assert _held_feet(wall, bottom, top) is None
 
 
 def test_a_strong_wall_comes_down_on_a_sloped_bottom(tmp_path):
