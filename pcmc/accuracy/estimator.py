@@ -24,10 +24,10 @@ from math import sqrt
 
 import numpy as np
 
-from ..base.arrays import Floats, mask_of
-from ..certificate.forces import Forces, held_boundary
+from ..base.arrays import Floats
+from ..certificate.forces import Forces
 from ..certificate.measures import MEASURES, largest_pull, pull_slopes
-from ..certificate.supports import boundary_shares
+from ..certificate.supports import line_shares
 from ..forces.functional import energy_and_gradient
 from ..meshing.curve_cutting import limit_growth, triangles_for
 from ..stability.equilibrium import Equilibrium
@@ -156,14 +156,11 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
     if quantity in ("area", "volume"):
         return MEASURES[quantity].measure(surface, of or None).by_position
     acting = Forces.of(surface)
-    share, edges = boundary_shares(acting, of.split(" near (")[0])
+    share, halves, own = line_shares(acting, of.split(" near (")[0])
     if quantity == "reaction per length":
-        own = mask_of(edges, len(surface.topology.edges))
         return largest_pull(acting, own & acting.along_patch(None)).by_position
     # at its ends a curve has half the pulls on its own edges, and its share of the rest
     ends, size = surface.topology.edges, segment_lengths(surface.vertices, surface.topology.sides)
-    halves = 0.5 * (mask_of(edges, len(ends))[:, None] - share[ends])
-    halves[~held_boundary(surface)] = 0.0
     direction = np.array(surface.plane.normal)
     if quantity == "thrust":
         force = share @ acting.along + (halves.sum(axis=1) * size) @ acting.pulls
@@ -181,10 +178,15 @@ def _slope(surface: Surface, quantity: str, of: str) -> Floats:
         np.add.at(slope, F[:, c], -np.cross(X[F[:, c - 2]] - X[F[:, c - 1]], sixth))
     some = np.flatnonzero(halves.any(axis=1))
     along = np.einsum("es,esd->ed", halves[some], (direction - freed)[ends[some, ::-1]])
-    sides, slopes = pull_slopes(surface, ends[some], along)
-    stretch = sides.tension / sides.height * np.einsum("sd,sd->s", sides.out, along[sides.edge])[:, None]
-    longer = np.stack([0.0 * sides.tangent, -sides.tangent, sides.tangent], axis=1)
-    np.add.at(slope, sides.corners, sides.length[:, None] * slopes + stretch[:, None] * longer)
+    sides, slopes, _ = pull_slopes(surface, ends[some], along)
+    pulls = sides.pulls(X[sides.corners], *sides.laws(surface))
+    stretch = np.einsum("sd,sd->s", pulls, along[sides.edge])[:, None]
+    t = X[sides.corners[:, 2]] - X[sides.corners[:, 1]]
+    length = np.linalg.norm(t, axis=1)[:, None]
+    slopes *= length[:, None]
+    slopes[:, 1] -= stretch * t / length
+    slopes[:, 2] += stretch * t / length
+    np.add.at(slope, sides.corners, slopes)
     return slope
 
 

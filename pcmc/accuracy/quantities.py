@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Floats, Ints
 from ..base.tolerances import ON
 from ..certificate import Certificate
-from ..certificate.supports import held_curves
+from ..certificate.supports import FORCE, held_lines, support_vertices
 from ..forces.rooms import closing_volumes, prescribed_volumes, room_pressures
 from ..forces.volume_below import volume_below
 from ..surface import Surface
 from ..surface.pieces import point_text
-from ..surface.topology import EdgeCurve
 
 ROUNDING = 1e-10  # of a quantity's size: what solving to rest leaves open
 SAME = 1e-6  # of the size, cubed: volumes this near are one, up to what solving to rest leaves open
@@ -24,8 +23,8 @@ RESIDUALS = 10.0  # that a quantity may change with the forces left, relative
 EIGENVALUES = 1e-12  # of the largest eigenvalue: rounding of the lowest one
 STIFFEST = 10.0  # the largest eigenvalue in units of α over the area of a triangle
 
-Key = tuple[str, str, tuple[int, ...], bytes]
-"""Quantity and patch; or quantity, sheets of a boundary curve, and its vertices in the coarsest mesh."""
+Key = tuple[str, str, str, bytes]
+"""Quantity and patch; or quantity, patches at a held line, and its vertices in the coarsest mesh."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
         what: str, of: str, value: float, rounding: float, estimate: float | None = None, key: Any = ()
     ) -> None:
         reading = Reading(what, of, value, value if estimate is None else estimate, rounding)
-        found[key or (what, of, (), b"")] = reading
+        found[key or (what, of, "", b"")] = reading
 
     for k, patch in enumerate(surface.patches):
         if surface.roof[k]:
@@ -70,13 +69,13 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
     against = 0.0 - certificate.load  # never -0
     add("reaction", "", certificate.support, pull, against)
     alone = against if len(certificate.supports) == 1 else None
-    for curve, name, force, most in _boundaries(surface, certificate):
-        old = np.sort(curve.vertices[curve.vertices < vertices]).tobytes()
+    for on, patches, name, force, most in _held_lines(surface, certificate):
+        old = np.sort(on[on < vertices]).tobytes()
         up, along = force @ np.array(surface.plane.normal), np.linalg.norm(surface.plane.along(force))
-        add("reaction", name, float(up), pull, alone, ("reaction", "", curve.sheets, old))
-        add("thrust", name, float(along), pull, None, ("thrust", "", curve.sheets, old))
+        add("reaction", name, float(up), pull, alone, ("reaction", "", patches, old))
+        add("thrust", name, float(along), pull, None, ("thrust", "", patches, old))
         what = "reaction per length"
-        add(what, name, most, share * tension, None, (what, "", curve.sheets, old))
+        add(what, name, most, share * tension, None, (what, "", patches, old))
     if len(certificate.eigenvalues):
         stiffest = STIFFEST * tension * surface.m / whole
         rounding = share * tension / size**2 + EIGENVALUES * stiffest
@@ -107,21 +106,22 @@ def given_volume(surface: Surface) -> float | None:
     return given if same and np.abs(share @ signs - roof).max() <= ROUNDING else None
 
 
-def _boundaries(surface: Surface, certificate: Certificate) -> Iterator[tuple[EdgeCurve, str, Floats, float]]:
-    """Each held boundary curve, its name, its reaction (3,) and the largest one per length.
+def _held_lines(surface: Surface, certificate: Certificate) -> Iterator[tuple[Ints, str, str, Floats, float]]:
+    """Each held line, of the boundary or inside: its vertices (k,), the names of its patches, its own name,
+    its reaction (3,) and the largest one per length.
 
-    Of several curves of one name, each is named with its place; those around one centre with the number of
+    Of several lines of one name, each is named with its place; those around one centre with the number of
     their support, too.
     """
-    curves = held_curves(surface)
-    table = certificate.boundaries.iloc[: len(curves)]  # the first of the supports
-    numbers = certificate.supports["support"].iloc[: len(curves)]
-    names = table["boundary"].astype(str).tolist()
-    middles, forces = (table[[f"{of}_{c}" for c in "xyz"]].to_numpy() for of in ("middle", "reaction"))
+    table = certificate.supports.iloc[held_lines(certificate.acting)]
+    on, names = support_vertices(certificate.acting), table["name"].astype(str).tolist()
+    middles, forces = (table[[*columns]].to_numpy() for columns in ("xyz", FORCE))
     near = [f"{name} near {point_text(at, surface.size)}" for name, at in zip(names, middles, strict=True)]
     places = [one if names.count(one) == 1 else other for one, other in zip(names, near, strict=True)]
+    numbers = table["support"].tolist()
     own = [at if places.count(at) == 1 else f"{at}, {k}" for at, k in zip(places, numbers, strict=True)]
-    yield from zip(curves, own, forces, table["per_length_max"].tolist(), strict=True)
+    most = table["per_length_max"].tolist()
+    yield from zip([on[k] for k in numbers], names, own, forces, most, strict=True)
 
 
 def _height(surface: Surface, patch: int, rounding: float) -> tuple[float, float, float]:

@@ -202,7 +202,8 @@ class Mast:
         most = SHARES[-1] * math.acosh(1.0 / SHARES[-1]) * self.clearance
         over = self.height - float(np.clip(self.height, -most, most))
         x, y, z = self.point.tolist()
-        return np.array([x, y, two_digits(z - over) if over else z])
+        digits = 1 - math.floor(math.log10(most))  # two of the height over the roof, wherever that is
+        return np.array([x, y, round(z - over, digits) if over else z])
 
     def radius(self, share: float) -> float:
         """The radius of a ring around it."""
@@ -306,7 +307,7 @@ def mast_note(plan: Plan, *, drawn: bool = False) -> str:
         else f"hold it on a ring, in [[plan.holes]], instead: {ring[2]}"
     )
     if (high := masts[0]).top[2] != high.point[2]:
-        change += ", as none can be so high as the point"
+        change += "; no ring can be as high as the point"
     if cut := [mast for mast in masts if mast.in_mirror]:  # the outline is to leave out its half
         radius = f"of radius {cut[0].radius(cut[0].share):g} around {cut[0].text}"
         change = f"hold it on a ring instead: lead the outline around it on an arc {radius},"

@@ -151,7 +151,7 @@ SWAP = f"try pcmc solve FILE --swap {VANISHED}, or pcmc.swap_neighbours(surface)
 KEY = 'in a plan, bottom = "{}"'
 ALONG = 30.0  # degrees: at a smaller angle to the support a junction counts as lying along it
 ALIKE = 6  # decimals of a share: symmetric places differ by rounding
-FOLDED = 150.0  # degrees
+FOLDED = 175.0  # degrees: a tent eleven times as high as wide may have less at its ridge
 SLIPS = 0.25  # of the mode's largest motion: that much beside a fixed end is a slip of this end
 
 
@@ -218,12 +218,13 @@ def worst_face(surface: Surface, left_out: Bools) -> tuple[int, float]:
 def folded_over(surface: Surface, pinchable: Bools) -> str:
     """Names a patch, not a wall that can pinch, with a triangle on the back of another; else empty.
 
-    Their normals turn by more than ``FOLDED`` at an edge that is neither held nor a cable's.
+    Their normals turn by more than ``FOLDED`` at an edge that is neither held nor a cable's. Patches without
+    tension and weight are left out: their area counts for nothing.
     """
-    topo = surface.topology
+    topo, counts = surface.topology, (surface.tensions != 0.0) | (surface.weights != 0.0)
     free = ~(topo.seam_edge | surface.fixed[topo.edges].all(axis=1))
     free[topo.edge_numbers(surface.cable_edges.ends)] = False
-    free[topo.edges_of(pinchable[surface.patch_of_face])] = False
+    free[topo.edges_of((pinchable | ~counts)[surface.patch_of_face])] = False
     sides = topo.neighbours[free[topo.valence == 2]]
     one, other = area_vectors(surface.vertices[surface.faces])[sides.T // 3]
     one[topo.one_way_edge[topo.edge_of_face.ravel()[sides[:, 0]]]] *= -1.0

@@ -25,12 +25,14 @@ from ..forces.cables import directions, pull_along
 from ..forces.elements import Points, add_values, energy_mesh
 from ..forces.pinching import standing_part
 from ..forces.triangles import totals_and_gradient
-from ..surface import Surface
+from ..surface import Plane, Surface
 from ..surface.checks import lying
 from ..surface.geometry import segment_lengths, vertex_sums
 from ..surface.parts import Cable
 from ..surface.supports import apply_supports, symmetric_part
 from ..surface.topology import EdgeCurve
+
+DAMPED = 1e-4  # of 1: bends that the next triangles do not tell stay small
 
 CableEnd = tuple[Cable, int, Floats]
 
@@ -221,60 +223,113 @@ def held_boundary(surface: Surface) -> Bools:
 def sheet_pulls(surface: Surface, ends: Ints) -> Floats:
     """(k,3) Σ (α + w z) n of the sheets at edges, given by their ends (k,2); 0 where there is none.
 
-    n is the outward co-normal; force/length. Along a junction of smooth surfaces at rest (7) without a cable
-    it is zero, of triangles only in the limit.
+    n is the outward co-normal of the curved sheet, see ``SheetSides``; force/length. Along a junction of
+    smooth surfaces at rest (7) without a cable it is zero, of triangles only in the limit.
     """
-    side, total = SheetSides.at(surface, ends), np.zeros((len(ends), 3))
-    np.add.at(total, side.edge, side.tension / np.where(side.height > 0.0, side.height, 1.0) * side.out)
+    sides, total = SheetSides.at(surface, ends), np.zeros((len(ends), 3))
+    np.add.at(total, sides.edge, sides.pulls(surface.vertices[sides.corners], *sides.laws(surface)))
     return total
 
 
 class SheetSides(NamedTuple):
-    """The sides of triangles at some edges. Each goes from a to b, and has the corner c opposite."""
+    """The sides of triangles at some edges. Each goes from a to b, and has the corner c opposite.
+
+    A triangle is parallel to its sheet about in its middle, not at its side. In its plane, with x along the
+    side from its middle, y inwards and z along the normal ν, the sheet is
+
+        z = ½ K_xx x² + ½ K_yy y² + K_xy x y + g y + z_0,     K_xx + K_yy = -(p - w ⟨ν, n⟩) / (α + w z),
+
+    through a, b and c, and as nearly as it can through the far corners d and e of the next triangles of the
+    sheet. Its co-normal at the side is that of the triangle turned by the slope g: for a smooth sheet at rest
+    its error is O(h²), that of the triangle's own O(h).
+    """
 
     edge: Ints  # (s,) which of the edges
     patch: Ints  # (s,)
-    corners: Ints  # (s,3) c, a and b
-    length: Floats  # (s,1)
-    tangent: Floats  # (s,3) from a to b
-    foot: Floats  # (s,1) how far from a to b the foot of c is, length
-    out: Floats  # (s,3) from c to its foot; outward, along the co-normal
-    height: Floats  # (s,1) the length of ``out``
-    z: Floats  # (s,1) height over Π of the middle
-    tension: Floats  # (s,1) α + w z there
+    corners: Ints  # (s,5) c, a, b, and d and e beyond b c and c a; a corner of its own where there is none
+    plane: Plane
 
     @classmethod
     def at(cls, surface: Surface, ends: Ints) -> SheetSides:
         """Those at edges that are given by their ends (k,2); none where there is no edge."""
-        numbers = surface.topology.edge_numbers(ends)
-        row = np.full(len(surface.topology.edges), -1)
+        topo, F = surface.topology, surface.faces
+        numbers = topo.edge_numbers(ends)
+        row = np.full(len(topo.edges), -1)
         row[numbers[numbers >= 0]] = np.flatnonzero(numbers >= 0)
-        edge = row[surface.topology.edge_of_face]
+        edge = row[topo.edge_of_face]
         face, corner = np.nonzero(edge >= 0)
-        corners = surface.faces[face[:, None], (corner[:, None] + np.arange(3)) % 3]
-        c, a, b = surface.vertices[corners].transpose(1, 0, 2)
-        length = np.linalg.norm(b - a, axis=1)[:, None]
-        tangent = (b - a) / np.where(length > 0.0, length, 1.0)
-        foot = np.einsum("ij,ij->i", c - a, tangent)[:, None]
-        out = a - c + foot * tangent
-        height = np.linalg.norm(out, axis=1)[:, None]
-        k, z = surface.patch_of_face[face], surface.plane.height(0.5 * (a + b))
-        tension = (surface.tensions[k] + surface.weights[k] * z)[:, None]
-        return cls(edge[face, corner], k, corners, length, tangent, foot, out, height, z[:, None], tension)
+        own = (corner[:, None] + np.arange(3)) % 3
+        beyond = _far_corners(surface)[face[:, None], own[:, 1:]]
+        corners = np.column_stack([F[face[:, None], own], beyond])
+        return cls(edge[face, corner], surface.patch_of_face[face], corners, surface.plane)
+
+    def laws(self, surface: Surface) -> tuple[Floats, Floats, Floats]:
+        """α, w and p (s,) of the sheets."""
+        of_patches = surface.tensions, surface.weights, surface.net_pressures
+        alpha, weight, pressure = (law[self.patch] for law in of_patches)
+        return alpha, weight, pressure
+
+    def pulls(self, X: Any, alpha: Any, weight: Any, pressure: Any) -> Any:
+        """(s,3) (α + w z) n with the corners at X (s,5,3), z the height over Π of a side's middle.
+
+        Complex arguments are allowed, so that derivatives are exact by complex steps.
+        """
+        up, middle = np.array(self.plane.normal), 0.5 * (X[:, 1] + X[:, 2])
+        tension = alpha + weight * ((middle - np.array(self.plane.point)) @ up)
+        t, length = _unit(X[:, 2] - X[:, 1])
+        n, height = _unit(middle - X[:, 0] + _dot(X[:, 0] - middle, t) * t)
+        normal = np.cross(n, t)
+        x, y, z = (_dot(X - middle[:, None], axis[:, None])[:, :, 0] / length for axis in (t, -n, normal))
+        terms = np.stack([0.5 * x * x, 0.5 * y * y, x * y], axis=2)
+        high = y[:, 0] + (height[:, 0] == 0.0)
+        rise = terms[:, 0] - terms[:, 1]
+        # of a and b all terms are the same: the plane through them and c has no slope along x
+        beyond = terms[:, 3:] - terms[:, 1:2] - (y[:, 3:] / high[:, None])[:, :, None] * rise[:, None]
+        trace = (weight * (normal @ up) - pressure) / np.where(tension == 0.0, 1.0, tension) * length[:, 0]
+        rows = np.concatenate([np.broadcast_to([[[1.0, 1.0, 0.0]]], beyond[:, :1].shape), beyond], axis=1)
+        back, right = rows.swapaxes(1, 2), np.column_stack([trace, z[:, 3:]])[:, :, None]
+        bends = np.linalg.solve(back @ rows + DAMPED * np.eye(3), back @ right)[:, :, 0]
+        slope = -_dot(rise, bends) / high[:, None]
+        return tension[:, None] * _unit(n - slope * normal)[0]
+
+
+@kept_with_owner
+def _far_corners(surface: Surface) -> Ints:
+    """(m,3) the corner beyond the side opposite each corner, of the next triangle of the same sheet; that
+    corner itself where there is none, or only an image of it."""
+    topo, F = surface.topology, surface.faces
+    ended, pairs = topo.curve_edge | surface.edges_on_curves.drawn, topo.neighbours
+    pairs = pairs[~ended[topo.edge_of_face.ravel()[pairs[:, 0]]]]
+    ends = np.sort(F[pairs[:, :, None] // 3, (pairs[:, :, None] % 3 + [1, 2]) % 3])
+    pairs = pairs[(ends[:, 0] == ends[:, 1]).all(axis=1)]
+    far = np.arange(F.size)
+    far[pairs] = pairs[:, ::-1]
+    return read_only(F.ravel()[far].reshape(F.shape))
+
+
+def _dot(u: Any, v: Any) -> Any:
+    """(…,1) the products of vectors (…,3), without conjugates."""
+    return (u * v).sum(axis=-1, keepdims=True)
+
+
+def _unit(v: Any) -> tuple[Any, Any]:
+    """Vectors (s,3) over their lengths, and the lengths (s,1); 0 where that is 0."""
+    size = np.sqrt(_dot(v, v))
+    return v / np.where(size == 0.0, 1.0, size), size
 
 
 def cable_parts(surface: Surface) -> list[tuple[Cable, EdgeCurve]]:
-    """The parts of each cable of tension > 0 between its ends, branches and the supports in between.
+    """The parts of each cable of tension > 0 between its ends, branches, other cables, and the supports in
+    between.
 
     A support in between is a mast that it runs over: a fixed vertex beside one that moves.
     """
-    parts = []
+    parts, meeting = [], np.bincount(surface.cable_edges.ends.ravel(), minlength=surface.n) > 2
     for cable in surface.cables:
         if cable.tension > 0.0:
-            mast = np.zeros(surface.n, dtype=bool)
-            leading = cable.edges[surface.fixed[cable.edges].sum(axis=1) == 1]
-            mast[leading] = surface.fixed[leading]
-            parts += [(cable, curve) for curve in surface.topology.chains(cable.edges, mast)]
+            leading, kink = cable.edges[surface.fixed[cable.edges].sum(axis=1) == 1], meeting.copy()
+            kink[leading] |= surface.fixed[leading]
+            parts += [(cable, curve) for curve in surface.topology.chains(cable.edges, kink)]
     return parts
 
 

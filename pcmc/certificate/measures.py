@@ -27,6 +27,7 @@ from .forces import Forces, SheetSides
 from .tables import lean_sines
 
 TIE = 1e-6  # of a maximum's size: a change of parameters as small, relative, may bring another one to the top
+TINY = 1e-30  # size of imaginary steps, whose squares vanish
 
 
 class Branches(NamedTuple):
@@ -171,37 +172,41 @@ def largest_pull(acting: Forces, edges: Bools) -> Measurement:
     def branches(near: Ints) -> Branches:
         ends = acting.surface.topology.edges[numbers[near]]
         unit = (pulls / np.where(sizes > 0.0, sizes, 1.0)[:, None])[near]
-        s, slopes = pull_slopes(surface, ends, unit)
+        s, slopes, by_law = pull_slopes(surface, ends, unit)
         sheet, one = Branches.of(s.corners, slopes, surface.n).by_position, np.arange(len(s.edge))
         together = csr_array((np.ones(len(one)), (s.edge, one)), shape=(len(near), len(one)))
-        along = csr_array((_dot(unit[s.edge], s.out / s.height)[:, 0], (one, s.patch)), (len(one), patches))
-        raised = csr_array(along.multiply(s.z))
-        by = {kind: (together @ m).toarray() for kind, m in (("tensions", along), ("weights", raised))}
-        return Branches(csr_array(together @ sheet), by)
+        by = {
+            kind: (together @ csr_array((values, (one, s.patch)), (len(one), patches))).toarray()
+            for kind, values in zip(("tensions", "weights", "pressures"), by_law, strict=True)
+        }
+        return Branches(csr_array(together @ sheet), by | {"snows": -by["pressures"]})
 
     return largest(sizes, float(surface.tensions.max()), branches)
 
 
-def pull_slopes(surface: Surface, ends: Ints, along: Floats) -> tuple[SheetSides, Floats]:
-    """The sides at edges, and the derivatives (s,3,3) of their pulls ⟨(α + w z) n, u⟩ by the corners c, a, b.
+def pull_slopes(surface: Surface, ends: Ints, along: Floats) -> tuple[SheetSides, Floats, Floats]:
+    """The sides at edges, and the derivatives of their pulls ⟨(α + w z) n, u⟩: (s,5,3) by their corners, and
+    (3,s) by α, w and p.
 
-    The edges are given by their ends (k,2), each with a vector u (k,3). A side from a to b of length L, with
-    the unit tangent t, has in a triangle of normal ν the co-normal n; the foot of its corner c, at the
-    distance h, is s of the way along. While the corners move by d,
-
-        dn = -⟨n, d_b - d_a⟩/L t + ⟨ν, (1 - s) d_a + s d_b - d_c⟩/h ν.
+    The edges are given by their ends (k,2), each with a vector u (k,3). Each derivative is the imaginary part
+    over a small imaginary step, exact to rounding.
     """
-    s, up = SheetSides.at(surface, ends), np.array(surface.plane.normal)
-    u, normal, foot = along[s.edge], s.out / s.height, s.foot / s.length
-    turn, tilt = s.tension * _dot(u, s.tangent) / s.length * normal, np.cross(s.tangent, normal)
-    tilt = s.tension * _dot(u, tilt) / s.height * tilt
-    rise = 0.5 * surface.weights[s.patch, None] * _dot(u, normal) * up
-    return s, np.stack([-tilt, turn + (1.0 - foot) * tilt + rise, foot * tilt - turn + rise], axis=1)
+    s = SheetSides.at(surface, ends)
+    X, laws, u = surface.vertices[s.corners], s.laws(surface), along[s.edge]
 
+    def slope(step: Any, by: int | None = None) -> Floats:
+        moved, changed = X + (step if by is None else 0.0), [*laws]
+        if by is not None:
+            changed[by] = changed[by] + step
+        found: Floats = (s.pulls(moved, *changed) * u).sum(axis=1).imag / TINY
+        return found
 
-def _dot(u: Floats, v: Floats) -> Floats:
-    """(s,1) the products of vectors (s,3)."""
-    return np.asarray(np.einsum("ij,ij->i", u, v)[:, None])
+    slopes = np.empty_like(X)
+    for place in np.ndindex(X.shape[1:]):
+        step = np.zeros(X.shape[1:], dtype=complex)
+        step[place] = TINY * 1j
+        slopes[:, *place] = slope(step)
+    return s, slopes, np.array([slope(TINY * 1j, by) for by in range(len(laws))])
 
 
 def _lean(surface: Surface, of: str | None) -> Measurement:

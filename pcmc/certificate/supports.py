@@ -94,19 +94,41 @@ def support_vertices(acting: Forces) -> dict[str, Ints]:
     return {part.label: part.vertices for part in _labelled(acting)}
 
 
-def boundary_shares(acting: Forces, name: str) -> tuple[Floats, Ints]:
-    """(n,) what the held boundary with a name takes of the forces that it shares, and its edges (j,).
+def held_lines(acting: Forces) -> Ints:
+    """(k,) the rows of the table of supports that are curves of the held boundary, and held lines inside.
 
-    With the share s the table's force is Σ s f + Σ ½ L (δ - s) q over the vertices, and over the ends of the
-    edges of length L under the pulls q; δ is 1 on its own edges. Without that name it is the whole boundary.
+    >>> from pcmc import Patch, Surface
+    >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=range(3))
+    >>> held_lines(Forces.of(flat)).tolist()
+    [0]
     """
-    (_, parts, _), taken = next(_sources(acting)), np.zeros((2, acting.surface.n))  # the boundary comes first
-    chosen = [part for part in parts if part.name == name] or parts
-    for row, some in enumerate((chosen, parts)):
-        for part in some:
-            taken[row, part.vertices] += _weights(acting, part)
-    share = np.divide(taken[0], taken[1], out=np.zeros(acting.surface.n), where=taken[1] > 0.0)
-    return share, np.concatenate([NONE, *(part.edges for part in chosen)])
+    boundary = len(held_curves(acting.surface))
+    kinds = [part.kind for part in _labelled(acting)]
+    return np.array([k for k, kind in enumerate(kinds) if k < boundary or kind == "line"], dtype=np.int64)
+
+
+def line_shares(acting: Forces, name: str) -> tuple[Floats, Floats, Bools]:
+    """What the held lines with a name take of the forces that they share: (n,) shares s and (e,2) halves c of
+    the pulls at the ends of edges; and (e,) their own edges.
+
+    The table's force is Σ s f over the vertices and Σ c L q over the ends of the edges of length L under the
+    pulls q: c = ½ (δ - s) on the edges of lines, δ is 1 on the own ones. Without that name it is all lines.
+    """
+    topo, share = acting.surface.topology, np.zeros(acting.surface.n)
+    halves, own = np.zeros(topo.edges.shape), np.zeros(len(topo.edges), dtype=bool)
+    groups = [parts for _, parts in _held_lines(acting)]
+    named = any(part.name == name for parts in groups for part in parts)
+    for parts, there in zip(groups, (acting.on_boundary, ~acting.on_boundary), strict=True):
+        taken, edges = np.zeros((2, acting.surface.n)), list[Ints]()
+        for part in parts:
+            chosen = part.name == name or not named
+            taken[: 1 + chosen, part.vertices] += _weights(acting, part)
+            own[part.edges] |= chosen
+            edges.append(part.edges)
+        share += np.divide(taken[1], taken[0], out=np.zeros_like(share), where=there & (taken[0] > 0.0))
+        lines = np.concatenate([NONE, *edges])
+        halves[lines] = 0.5 * there[topo.edges[lines]] * (own[lines, None] - share[topo.edges[lines]])
+    return share, halves, own
 
 
 def boundary_view(supports: pd.DataFrame) -> pd.DataFrame:
@@ -141,10 +163,10 @@ def balance_table(acting: Forces, supports: pd.DataFrame) -> pd.DataFrame:
     parts = np.array([loads, carried, loads + carried])
     if acting.surface.periodic:  # the forces across the seam have moments, and no resultant
         parts[2, 1] = np.nan
-    shares = np.abs(parts).max(axis=2) / np.where(scale > 0.0, scale, 1.0)
     pulled = float((supports["length"] * supports["per_length_max"]).sum())  # may cancel along each line
-    scale = np.maximum(scale, pulled * np.array([1.0, acting.surface.size]))
-    parts[np.abs(parts) <= FORCE_ROUNDING * scale[:, None]] = 0.0
+    most = np.maximum(scale, pulled * np.array([1.0, acting.surface.size]))
+    parts[np.abs(parts) <= FORCE_ROUNDING * most[:, None]] = 0.0
+    shares = np.abs(parts).max(axis=2) / np.where(scale > 0.0, scale, 1.0)
     values = np.column_stack([parts.reshape(3, 6), np.tile(about, (3, 1)), shares]).T
     columns = ["of", *columns, "force_share", "moment_share"]
     return pd.DataFrame(dict(zip(columns, [["loads", "supports", "remainder"], *values], strict=True)))
@@ -154,10 +176,10 @@ def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
     """How exactly the supports carry the loads, of the piece between ``mirrors`` if there are any."""
     left = table.iloc[-1]
     force, moment = left["force_share"], left["moment_share"]
-    share = f"to {force:.1g} of them in x, y and z"
+    share = f"to {force:.1g} of them in x, y and z" if force else "to rounding in x, y and z"
     if np.isnan(moment):  # of a periodic surface
         return f"the supports carry the loads {share}" if table.iloc[0][[*FORCE]].any() else ""
-    share += f", and to {moment:.1g} in moments"
+    share += f", and to {f'{moment:.1g}' if moment else 'rounding'} in moments"
     if not table.iloc[0][[*FORCE]].any():
         return f"the forces of the supports cancel {share}"
     place = point_text(left[[*"xyz"]].to_numpy(float))
@@ -212,8 +234,9 @@ def _sources(acting: Forces) -> Iterator[tuple[Floats, list[_Part], tuple[Bools,
     upright = [abs(float(np.dot(p.normal, surface.plane.normal))) <= PARALLEL for p, _ in surface.on_planes]
     of_plane = ["upright plane" if steep else "plane" for steep in upright]
     kinds = [*of_plane, "plane", "line", "ground"]  # -2 and -1 count from the end
-    boundary = [_line(surface, "", curve) for curve in held_curves(surface)]
-    yield acting.along, [part._replace(kind=kinds[support[part.edges[0]]]) for part in boundary], None
+    boundary, within = _held_lines(acting)
+    parts = [part._replace(kind=kinds[support[part.edges[0]]]) for part in boundary[1]]
+    yield boundary[0], parts, None
 
     for k, (plane, mask) in enumerate(surface.on_planes, start=1):
         if plane.mirror:
@@ -225,11 +248,7 @@ def _sources(acting: Forces) -> Iterator[tuple[Floats, list[_Part], tuple[Bools,
                 parts.append(_line(surface, "mirror", curve, f" in the {plane}", across))
             yield acting.by_plane[k], parts, (mask, f"single points in the {plane}", "mirror")
 
-    chosen = acting.lines.all(axis=1) & ~topo.boundary_edge & at_both_ends(acting.clamped, topo.edges)
-    along = np.where(acting.on_boundary[:, None], 0.0, acting.along)
-    found = topo.curves_among(chosen)
-    within = [_line(surface, "line", c, "" if len({*c.sheets}) > 1 else ", inside") for c in found]
-    yield along, within, None
+    yield *within, None
 
     inside, standing = ~acting.clamped & ~acting.on_boundary, acting.standing
     at_rest = standing.on_ground | (acting.by_plane[0].any(axis=1) & ~acting.clamped)
@@ -251,6 +270,19 @@ def _sources(acting: Forces) -> Iterator[tuple[Floats, list[_Part], tuple[Bools,
             names.setdefault(vertex, []).append(cable.name)
     cables = [_Part(" + ".join(names[v]), "cable end", np.array([v]), X[v]) for v in sorted(names)]
     yield acting.points, cables, None
+
+
+def _held_lines(acting: Forces) -> tuple[tuple[Floats, list[_Part]], tuple[Floats, list[_Part]]]:
+    """The forces (n,3) and the parts of the held boundary, and of the held lines inside the surface, where
+    several sheets may end."""
+    surface, topo = acting.surface, acting.surface.topology
+    boundary = [_line(surface, "", curve) for curve in held_curves(surface)]
+    chosen = acting.lines.all(axis=1) & ~topo.boundary_edge & at_both_ends(acting.clamped, topo.edges)
+    within = [
+        _line(surface, "line", c, "" if len({*c.sheets}) > 1 else ", inside")
+        for c in topo.curves_among(chosen)
+    ]
+    return (acting.along, boundary), (np.where(acting.on_boundary[:, None], 0.0, acting.along), within)
 
 
 def _on_plane(acting: Forces, mask: Bools, inside: Bools, kind: str, where: str) -> list[_Part]:

@@ -103,7 +103,7 @@ def junction_table(surface: Surface, left: Floats) -> pd.DataFrame:
 
 
 def cable_table(surface: Surface, left: Floats) -> pd.DataFrame:
-    """A row per cable, or per part of it between supports, branches and ends.
+    """A row per cable, or per part of it between supports, branches, other cables and ends.
 
     At rest a cable of tension τ and curvature vector κ balances the sheets along it: Σ α n + τ κ = 0 with
     their outward co-normals n; so along the free edge of a flat sheet α = τ κ. Of triangles this holds in

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from .arguments import with_groups
-from .building import draw_, panels_, pattern, report_, structure
+from .building import pattern, structure
+from .drawing import draw_, panels_, report_
 from .files import cache_, convert, explore, plan, plot, repair_, schema
 from .solving import certify_, equilibria_, remesh_, solve_, sweep
 

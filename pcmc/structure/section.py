@@ -293,11 +293,11 @@ class Structure:
             whole = mirrored(surface)
             for zone, (plane, _) in product(self.zones, surface.on_planes):
                 area = zone.get("area", ())
-                if plane.mirror and len(area) and (in_area(area, whole) != in_area(area, whole, plane)).any():
-                    text = (
-                        f"{zone['case']}: its area is on one side of the {plane} alone in the whole, and on"
-                    )
-                    text += " both in the part; if both are meant, draw its image, too"
+                if not (plane.mirror and len(area)) or in_area(area, surface, plane).any():
+                    continue  # what goes on behind the plane, the part refuses, or has the same
+                if in_area(area, surface).any():
+                    text = f"{zone['case']}: its area is on one side of the {plane}, and the whole has it"
+                    text += " there alone; if its image is meant, too, draw it"
                     warnings.warn(text, LoadWarning, stacklevel=3)
             return self.of_whole(surface, whole, plan).check(whole, plan)
         self.thicknesses(surface)

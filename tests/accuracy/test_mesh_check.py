@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from nightly import at_night
 from refusals import refused
 from shapes import cap, disc, pyramid
+from support_cases import lens, on_unit_circle
 
 from generators import (
     joined_caps,
@@ -217,6 +218,17 @@ def test_scales_of_length_and_force_scale_the_table(length, force):
         for column in ("value", "error", "limit", "limit_error"):
             assert b[column] == pytest.approx(scale[a.quantity] * a[column], rel=1e-4), (a.quantity, column)
         assert b.order == pytest.approx(a.order, abs=1e-4, nan_ok=True)  # of a pull that no mesh changes
+
+
+def test_a_line_where_two_sheets_end_has_bars():
+    """A lens on a ring: its pull is 2 α cos θ inwards, and the two foils' loads cancel."""
+    check = check_mesh(solve(lens()), boundary=on_unit_circle)
+    exact = 2.0 * (0.36 - 0.25) ** 0.5
+    row = check.row("reaction per length", "foil | foil below")
+    assert abs(row.value - exact) <= row.error < 0.1 * exact
+    assert abs(row.limit - exact) <= row.limit_error < 0.01 * exact
+    assert row.order == pytest.approx(2.0, abs=0.3)
+    assert check.row("reaction", "foil | foil below").value == pytest.approx(0.0, abs=1e-9)
 
 
 def test_other_numbers_of_meshes():

@@ -124,6 +124,29 @@ def test_slopes_of_reactions_are_derivatives_of_the_table_of_supports(roof, quan
     assert 0.5 * (ahead - back) == pytest.approx(predicted, rel=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore::pcmc.base.errors.CurveWarning")
+@pytest.mark.parametrize("quantity", ["reaction", "thrust"])
+def test_slopes_of_the_reaction_of_a_line_inside(quantity):
+    """A ridge of two sheets that ends on the boundary, whose vertices have their forces in other rows."""
+    plan = Plan(
+        [[0, 0], [6, 0], [6, 6], [0, 6]],
+        [],
+        tension=6.0,
+        edge_length=1.2,
+        supports=[[[3, 0, 0], [3, 3, 1]]],
+    )
+    tent = solve(plan.surface()).surface
+    motion = np.random.default_rng(3).normal(size=tent.vertices.shape) * 1e-6
+
+    def value(surface: Surface) -> float:
+        row = pcmc.certify(surface).supports.set_index("name").loc["patch 1, inside"]
+        return row["force_z"] if quantity == "reaction" else float(np.hypot(row["force_x"], row["force_y"]))
+
+    ahead, back = (value(tent.moved(tent.vertices + s * motion)) for s in (1.0, -1.0))
+    predicted = float((_slope(tent, quantity, "patch 1, inside") * motion).sum())
+    assert 0.5 * (ahead - back) == pytest.approx(predicted, rel=1e-4)
+
+
 def test_the_largest_pull_of_a_mesh_check_is_the_target(roof):
     heavy = roof.retensioned(weights={roof.patches[0].name: 0.5})
     slope = _slope(heavy, "reaction per length", "")

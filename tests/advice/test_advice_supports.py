@@ -69,6 +69,13 @@ def test_a_point_mast_is_noted_before_the_solve(tmp_path):
     project.load(path)  # a warning would be an error
 
 
+def test_a_lower_ring_is_rounded_over_the_roof_not_over_0():
+    """At 523.4 m, two digits of the height were 530: above the point."""
+    square = [[0, 0, 523.4], [10, 0, 523.4], [10, 10, 523.4], [0, 10, 523.4]]
+    plan = Plan(square, supports=[[5, 5, 535.4]], tension=1.0, pressure=0.0, edge_length=1)
+    assert [mast.top.tolist() for mast in point_masts(plan)] == [[5.0, 5.0, 526.7]]
+
+
 def test_a_support_outside_the_plan_is_no_mast():
     square = [[0, 0], [8, 0], [8, 8], [0, 8]]
     assert not point_masts(Plan(square, supports=[[12, 4, 2]], tension=2.0, edge_length=1))
@@ -105,7 +112,7 @@ def test_a_point_that_is_too_high_for_any_ring_gets_a_lower_one(tmp_path):
         "[plan] supports: remove [5, 4, 6]",
         "[plan.patches] roof: at = [[5.0, 6.64]]  (now [5, 4.5])",
     ]
-    with pytest.warns(FileWarning, match=r"4\.3\], radius = 2\.2\}\}, as none can be so high as the point"):
+    with pytest.warns(FileWarning, match=r"4\.3\], radius = 2\.2\}\}; no ring can be as high as the point"):
         project.load(file)
     ring = "holes = [{curve = {circle = {centre = [5, 4, 4.3], radius = 2.2}}}]\n"
     plan = plan.replace("supports = [[5, 4, 6]]\n", ring)

@@ -12,6 +12,7 @@ import pcmc
 from pcmc import Patch, Surface, certify, solve
 from pcmc.certificate import Evidence, Verdict
 from pcmc.certificate.balance import coarseness, load_ratio
+from pcmc.certificate.diagnosis import folded_over
 from pcmc.certificate.proof import Attempt
 from pcmc.certificate.verdict import Findings, judge
 from pcmc.plan import Plan
@@ -170,6 +171,19 @@ def test_a_flat_sail_with_triangles_on_their_backs_is_not_certified():
     assert certificate.verdict is Verdict.DEGENERATE
     assert "patch 'sail' is folded near" in certificate.detail
     assert certify(sail.moved([*rim, [3.9, 2, 0]])).certified
+
+
+def test_a_steep_tent_and_a_folded_wall_without_tension_are_not_folded_over():
+    """No triangle of the tent, of 14° at its ridge, lies on another; the wall has no area that counts."""
+    eaves, ridge = [[0, 0, 0], [6, 0, 0], [6, 1, 0], [0, 1, 0]], [[0, 0.5, 4], [6, 0.5, 4]]
+    F = [[0, 1, 5], [0, 5, 4], [2, 3, 4], [2, 4, 5]]
+    tent = Surface([*eaves, *ridge], F, [0] * 4, [Patch("tent", 1.0)], fixed=range(4))
+    assert folded_over(tent, np.zeros(1, dtype=bool)) == ""
+    rim, spokes = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]], [[k, (k + 1) % 4] for k in range(4)]
+    F = [[*spoke, middle] for middle in (4, 5) for spoke in spokes]
+    patches = [Patch("sail", 1.0, 0.0), Patch("wall", 0.0, 0.0)]
+    certificate = certify(Surface([*rim, [2, 2, 0], [4.5, 2, 0]], F, [0] * 4 + [1] * 4, patches, range(4)))
+    assert certificate.verdict is Verdict.STABLE
 
 
 def test_evidence_of_the_way_decides_what_the_shape_leaves_open():

@@ -6,16 +6,13 @@ from importlib.util import find_spec
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 import volume_cases
-from programs import needs_evolver
 from refusals import refused
 
 from generators import (
     catenoid,
     catenoid_exact,
-    cylinder,
     enneper,
     enneper_exact,
     four_fans,
@@ -23,14 +20,11 @@ from generators import (
     spherical_cap_exact,
     two_squares,
 )
-from generators.grid import grid_faces
-from pcmc import BoundaryMotion, Cable, Direction, Patch, Plane, Room, Surface, find_equilibria, follow, solve
+from pcmc import BoundaryMotion, Direction, Patch, Room, Surface, find_equilibria, follow, solve
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.equilibria import branches, shape_distance
+from pcmc.equilibria import shape_distance
 from pcmc.equilibria.found import Equilibria, WayDown
 from pcmc.forces.functional import patch_areas
-from pcmc.solvers.continuation import Branch, Ending
-from studies.reference import evolver
 
 SMALL, LARGE = spherical_cap_exact(), spherical_cap_exact(upper=True)
 
@@ -151,135 +145,6 @@ def test_enneper_s_surface_is_the_pass_between_two_that_are_images_of_each_other
     assert {barrier.to for barrier in found.barriers} == {1, 2}
 
 
-@needs_evolver
-def test_two_unduloids_leave_the_cylinder_of_length_2_pi():
-    """The index of the cylinder rises where L = 2πR; both lean back over shorter cylinders."""
-    edge, length = 2.0 * np.pi / 14, 6.0
-    tube = cylinder(edge, length=length, exact=True)
-    tube = solve(tube.moved(tube.vertices - [0.0, 0.0, 0.5 * length]), target="stationary").surface
-    x, y, z = tube.vertices[tube.fixed].T
-    longer = BoundaryMotion(lambda L: np.stack([x, y, 0.5 * np.sign(z) * L], axis=1), start=length)
-    found = find_equilibria(tube, longer, starts=0, span=(5.8, 6.6))
-    assert [one.index for one in found.found] == [1, 2, 2]
-    assert found[2].energy == pytest.approx(found[3].energy, rel=1e-6)
-    cylinders, one, other = found.branches["boundary"]
-    assert cylinders.bifurcations.parameter.iloc[0] == pytest.approx(2.0 * np.pi, rel=0.01)
-    assert one.points.parameter[0] == other.points.parameter[0] == cylinders.bifurcations.parameter.iloc[0]
-    assert [evolver.inertia(one.surface).negative for one in found.found] == [1, 2, 2]
-
-
-def test_two_unduloids_leave_a_tube_of_prescribed_volume():
-    """A quarter of a tube between mirror planes at 0 and 3: below the radius 3/π it is a saddle.
-
-    Half a period of the unduloid of volume 3π has the area 18.862749, by its equation, and the tube 6π.
-    """
-    length, number = 3.0, np.arange(13 * 7).reshape(13, 7)
-    along, around = np.meshgrid(np.linspace(0.0, length, 13), np.linspace(0.0, np.pi / 2, 7), indexing="ij")
-    X = np.stack([np.cos(around), np.sin(around), along], axis=-1).reshape(-1, 3).round(15)
-    sides = {(1, 0, 0): number[:, -1], (0, 1, 0): number[:, 0], (0, 0, 1): number[0], (0, 0, -1): number[-1]}
-    planes = [(Plane(X[on[0]], normal, mirror=True), on) for normal, on in sides.items()]
-    room = Room("inside", {"tube": 1}, np.pi * length / 4.0)
-    faces = grid_faces(12, 6)[:, ::-1]
-    tube = Surface(X, faces, np.zeros(144, int), [Patch("tube", 1.0)], on_planes=planes, rooms=[room])
-    found = find_equilibria(solve(tube, target="stationary"), "volume", starts=0)
-    assert [one.index for one in found.found] == [0, 1, 1]
-    assert found[2].energy == pytest.approx(found[3].energy, rel=1e-12)
-    assert 4.0 * found.barrier(1) == pytest.approx(18.862749 - 6.0 * np.pi, rel=0.1)
-    critical = found.branches["volume"][0].bifurcations.parameter
-    assert critical.tolist() == pytest.approx([(length / np.pi) ** 2], rel=0.01)
-
-
-def test_each_of_two_bifurcations_of_nearly_one_shape_is_followed():
-    """Quarters of two tubes that do not touch, one a little longer: each is left by two unduloids."""
-    lengths, number = (3.0, 3.05), np.arange(9 * 5).reshape(9, 5)
-    rows, planes = list[np.ndarray](), {}
-    for first, bottom, length in ((0, 0.0, lengths[0]), (45, 10.0, lengths[1])):
-        around, along = np.linspace(0.0, np.pi / 2, 5), np.linspace(bottom, bottom + length, 9)
-        around, along = np.meshgrid(around, along)
-        rows.append(np.stack([np.cos(around), np.sin(around), along], axis=-1).reshape(-1, 3).round(15))
-        for side, on in (((1, 0, 0), number[:, -1]), ((0, 1, 0), number[:, 0])):
-            planes.setdefault(Plane((0, 0, 0), side, mirror=True), []).extend(first + on)
-        for on in (number[0], number[-1]):
-            planes[Plane((0, 0, rows[-1][on[0], 2]), (0, 0, 1))] = first + on
-    faces = grid_faces(8, 4)[:, ::-1]
-    rooms = [Room(f"in {k}", {f"tube {k}": 1}, np.pi * length / 4.0) for k, length in enumerate(lengths)]
-    patches, patch = [Patch(f"tube {k}", 1.0) for k in (0, 1)], np.repeat([0, 1], len(faces))
-    tubes = Surface(np.vstack(rows), [*faces, *(faces + 45)], patch, patches, on_planes=planes, rooms=rooms)
-    found = find_equilibria(solve(tubes, target="stationary"), "volume", starts=0, depth=1)
-    first, *others = found.branches["volume"]
-    critical = first.bifurcations.parameter
-    assert critical.tolist() == pytest.approx([(length / np.pi) ** 2 for length in lengths], rel=0.02)
-    assert sorted(other.points.parameter[0] for other in others) == sorted([*critical, *critical])
-    assert [one.index for one in found.found] == [0, 1, 1, 1, 1]
-
-
-def test_a_crossing_without_an_equilibrium_is_named(monkeypatch):
-    resume = Branch.resume
-
-    def lost(branch, row, stop, **options):
-        return replace(resume(branch, row, stop, **options), ending=Ending.LOST, detail="too steep")
-
-    monkeypatch.setattr(Branch, "resume", lost)
-    found = find_equilibria(spherical_cap(0.5), starts=0)
-    assert len(found) == 1
-    lines = [line for line in str(found).splitlines() if line.startswith("A branch passes pressure 1, but")]
-    assert len(lines) == 1
-    assert "not reached: the branch could not be followed further" in lines[0]
-    assert "(too steep)" in lines[0]
-
-    def higher(branch, row, stop):
-        way = resume(branch, row, stop)
-        return replace(way, surfaces={0: way.last.moved(way.last.vertices * [1.0, 1.0, 1.01])})
-
-    monkeypatch.setattr(Branch, "resume", higher)
-    found = find_equilibria(spherical_cap(0.5), starts=0)
-    assert "A branch passes pressure 1, but its equilibrium there cannot be certified." in str(found)
-
-
-def test_a_crossing_between_a_bifurcation_and_a_fold_has_no_point_to_start_from():
-    points = pd.DataFrame({"arclength": [0.0, 0.1], "parameter": [1.2, 1.3], "slope": [0.0, 1.0]})
-    folds = pd.DataFrame({"arclength": [0.05], "parameter": [0.9]})
-    way = SimpleNamespace(ending=Ending.REACHED, last="a surface")
-    branch = SimpleNamespace(points=points, folds=folds, resume=lambda row, value: way)
-    line = branches.TracedParameter("pressure", Direction({"cap": 1.0}), 1.0, (0.5, 1.5))
-    (one, beside), other = line.crossings(branch)
-    assert one == "no regular point of the branch is beside it"
-    assert beside == "1.2 and was first met at 0.9"
-    assert other == ("a surface", "")
-
-
-def test_a_branch_that_ends_within_the_span_is_named(monkeypatch):
-    """Of an edge cable of chord 2 on a film of tension 1 the arcs end at the half circle, of tension 1."""
-    X = np.array([[x, y, 0.0] for x in np.linspace(-1.0, 1.0, 9) for y in np.linspace(0.0, 3.0, 13)])
-    rim, edge = (np.abs(X[:, 0]) == 1.0) | (X[:, 1] == 3.0), Cable.along("edge", 1.5, np.arange(0, 117, 13))
-    film = Surface(X, grid_faces(8, 12), [0] * 192, [Patch("film", 1.0, 0.0)], fixed=rim, cables=[edge])
-    (line,) = find_equilibria(film, Direction(cables={"edge": 1.0}), starts=0).failed
-    assert line.startswith("A branch ended at parameter 1.0")
-    assert "as triangles collapse; what lies beyond on it is not known" in line
-    monkeypatch.setattr(branches, "STEPS", 2)
-    one, other = find_equilibria(spherical_cap(0.5), starts=0).failed
-    assert "A branch ended at pressure 0.8" in one
-    assert "after 2 steps" in one
-    assert "after 2 steps" in other
-
-
-def test_why_no_branch_starts_at_an_equilibrium_is_said():
-    tube = volume_cases.cylinder(0.7, 2.0, "plates")
-    (line,) = find_equilibria(tube, "volume", starts=0).failed
-    assert line.startswith("No branch in volume starts at the equilibrium from the start given: follow: ")
-    assert "nothing holds the surface against 2 rigid motions" in line
-
-
-@pytest.mark.nightly
-def test_a_way_back_past_a_bifurcation_to_a_known_shape_is_named():
-    """The index rises at 1.05, but on this mesh walls lean below 0.95 only; at 1 they are upright."""
-    found = find_equilibria(two_squares(8, alpha_aux=2.1), "tension of wall", starts=0, depth=1)
-    assert [one.index for one in found.found] == [0]
-    assert "A branch left at tension of wall 1.05 and was first met at 0.9456; the way from there" in str(
-        found
-    )
-
-
 @pytest.mark.nightly
 def test_walls_that_lean_to_either_side_are_two_equilibria():
     found = find_equilibria(two_squares(8, alpha_aux=1.95), "tension of wall", starts=0, span=(0.85, 1.15))
@@ -291,28 +156,6 @@ def test_walls_that_lean_to_either_side_are_two_equilibria():
     assert shape_distance(mirrored, right.surface) < 0.1 * shape_distance(left.surface, right.surface)
     for other in (2, 3):
         assert f"barrier from 1 to {other}: not known" in str(found)
-
-
-def test_where_contact_hides_a_change_of_index_the_branch_is_followed_in_shorter_steps(monkeypatch):
-    """Only a change of index on the step of a change of contact asks for that."""
-    steps = []
-
-    def follow(surface, parameter, *, largest, **options):
-        steps.append(largest)
-        at = [0.3, 0.3] if largest > 0.01 else [0.3, 0.31]
-        events = pd.DataFrame({"kind": ["index", "contact"], "arclength": at})
-        return SimpleNamespace(events=events, ending=Ending.STEPS)
-
-    monkeypatch.setattr(branches, "follow", follow)
-    cap = spherical_cap(0.5)
-    line = branches.TracedParameter.of(cap, "pressure", None)
-    assert line._half(cap, 1.0, lambda _: None).events.arclength.tolist() == [0.3, 0.31]
-    assert steps == list(branches.LARGEST)
-
-
-def test_without_a_span_a_branch_goes_half_of_the_present_value_each_way():
-    cap = spherical_cap(0.5, alpha=2.5)
-    assert branches.TracedParameter.of(cap, Direction({"cap": 1.0}), None).span == (1.25, 3.75)
 
 
 def test_each_equilibrium_is_checked_on_finer_meshes_if_that_is_asked_for():
@@ -400,18 +243,6 @@ def test_minima_that_no_saddle_joins_are_named():
     ]
 
 
-def test_branches_that_ended_alike_are_one_line(caps):
-    ended = "A branch ended at pressure {} as triangles collapse; what lies beyond on it is not known."
-    others = tuple(f"The {k} ways down from a saddle of index {k}: inflates ({k})." for k in (2, 3))
-    found = replace(caps[0], failed=(*map(ended.format, (0.8678, 1.179)), *others, ended.format(1.1)))
-    lines = found.text().splitlines()
-    assert [line for line in lines if "ended" in line] == [
-        "3 branches ended at pressure 0.8678, 1.179, 1.1 as triangles collapse; what lies beyond on them"
-        " is not known."
-    ]
-    assert {*others} <= {*lines}
-
-
 def test_a_way_that_the_solver_lost_is_no_way_out():
     """Where it stalls, nobody knows what lies there; where the roof inflates, it has left the minimum."""
     shapes = [(0, 0.0), (1, 1.0), (1, 2.0)]
@@ -451,20 +282,21 @@ def test_a_search_ends_at_the_most_equilibria_that_are_wanted():
     assert "raise most" in str(found)
 
 
-def test_the_line_may_be_a_direction_and_the_boundary():
-    cap = spherical_cap(0.25)
-    found = find_equilibria(cap, [Direction(pressures={"cap": 1.0})], starts=0)
-    assert [one.index for one in found.found] == [0, 1]
-    ring = cap.vertices[cap.fixed]
-    wider = BoundaryMotion(lambda radius: ring * [radius, radius, 1.0], start=1.0)
-    found = find_equilibria(cap, wider, starts=0)
-    assert [one.index for one in found.found] == [0, 1]
-    assert found.branches["boundary"][0].folds.parameter[0] == pytest.approx(1.2, abs=0.05)
-
-
 @pytest.mark.nightly
 def test_walls_on_both_diameters_slip_away_from_their_balance():
     """Example 3 of the paper: each wall gets shorter as it leaves its diameter, so the index is 2."""
     found = find_equilibria(four_fans(5), (), starts=0)
     assert [one.index for one in found.found] == [2]
     assert found.failed == ("The 4 ways down from a saddle of index 2: pinches off or collapses (4).",)
+
+
+def test_branches_that_ended_alike_are_one_line(caps):
+    ended = "A branch ended at pressure {} as triangles collapse; what lies beyond on it is not known."
+    others = tuple(f"The {k} ways down from a saddle of index {k}: inflates ({k})." for k in (2, 3))
+    found = replace(caps[0], failed=(*map(ended.format, (0.8678, 1.179)), *others, ended.format(1.1)))
+    lines = found.text().splitlines()
+    assert [line for line in lines if "ended" in line] == [
+        "3 branches ended at pressure 0.8678, 1.179, 1.1 as triangles collapse; what lies beyond on them"
+        " is not known."
+    ]
+    assert {*others} <= {*lines}

@@ -154,6 +154,18 @@ def test_a_cable_pulls_on_its_ends_along_its_tangent_there():
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.35)
 
 
+def test_a_cable_has_a_kink_where_another_one_holds_it():
+    """Two ropes of 10 and one of 8 over a film that hardly pulls: all three are straight."""
+    ropes = [pcmc.Cable("a", 10.0, [[0, 3], [3, 1]]), pcmc.Cable("b", 8.0, [[3, 2]])]
+    corners = [[-2, 0, 0], [2, 0, 0], [0, -3, 0], [0, -1, 0]]
+    film = pcmc.Surface(corners, [[0, 2, 3], [2, 1, 3]], [0, 0], [pcmc.Patch("film", 1e-6, 0.0)],
+                        fixed=range(3), cables=ropes)  # fmt: skip
+    certificate = pcmc.certify(solve(film).surface)
+    held = certificate.cable_ends.query("held")[["force_x", "force_y"]]
+    assert held.to_numpy() == pytest.approx(np.array([[-(84**0.5), 4], [84**0.5, 4], [0, -8]]), abs=1e-5)
+    assert certificate.cables.cable_pull.max() < 1e-12
+
+
 def test_a_hypar_roof_on_four_masts_is_stable(roof):
     certificate = pcmc.certify(roof)
     assert certificate.verdict is Verdict.STABLE

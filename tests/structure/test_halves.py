@@ -269,9 +269,10 @@ def test_a_line_in_a_mirror_is_drawn_as_no_rim():
     assert lengths[0]["PCMC-MIRROR"] == pytest.approx(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
 
-@pytest.mark.parametrize(("east", "told"), [(3.0, True), (5.0, True), (10.0, False)])
-def test_a_zone_that_is_no_image_of_itself_in_the_whole_is_named(east, told):
-    """In the part it acts on the images, too; without a word the whole had half of the drift."""
+@pytest.mark.parametrize(("east", "told"), [(3.0, True), (5.0, True), (8.0, False), (10.0, False)])
+def test_a_zone_on_one_side_alone_is_named_in_the_whole(east, told):
+    """In the part it acts on the images, too; without a word the whole had half of the drift. The part
+    refuses one that goes on behind the mirror, and is another one there."""
     half, _ = halves()
     zone = {"case": "drift", "snow": 0.3, "area": [[0, 0], [east, 0], [east, 3], [0, 3]]}
     with warnings.catch_warnings(record=True) as caught:

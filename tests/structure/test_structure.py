@@ -328,7 +328,7 @@ def test_a_project_is_solved_and_has_the_values(tmp_path, monkeypatch, capsys):
     assert cli.main(["structure", "roof.toml", "-o", "roof.inp"]) == 2
 
 
-def test_values_of_the_command_replace_those_of_the_patches_that_they_name(tmp_path, monkeypatch):
+def test_values_of_the_command_replace_those_of_the_patches_that_they_name(tmp_path, monkeypatch, capsys):
     """The others keep theirs; a bare value is of all that are not named, those with their own, too."""
     monkeypatch.chdir(tmp_path)
     plan = "[plan]\nedge_length = 1.0\noutline = [[0, 0], [4, 0], [4, 3], [0, 3]]\n"
@@ -350,6 +350,10 @@ def test_values_of_the_command_replace_those_of_the_patches_that_they_name(tmp_p
     assert thicknesses("--thickness", "west=0.005") == [0.005, 0.001]
     assert thicknesses("--thickness", "east=0.005") == [0.003, 0.005]
     assert thicknesses("--thickness", "0.002") == [0.002, 0.002]
+    Path("roof.toml").write_text(plan + values + "patches = {wset = {young = 2e6}}\n")
+    capsys.readouterr()
+    assert cli.main([*given, "--thickness", "0.002"]) == 2
+    assert "unknown patch 'wset'; did you mean 'west'?" in capsys.readouterr().err
 
 
 def test_a_member_alone_has_a_weight_too(tmp_path, monkeypatch, capsys):
