@@ -12,9 +12,11 @@ import numpy as np
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..base.tolerances import ON
 from ..surface import Surface, unfolded
 from ..surface.parts import image_names, with_images
+from .cut_mesh import nearest_places
+
+SAME = 1e-3  # of the size of a roof: drawn seams so near to each other all along are one
 
 NUMBERS: dict[str, dict[str, Any]] = {  # keys of numbers, with their limits
     "width": {"above": 0.0},
@@ -136,26 +138,32 @@ class CuttingOptions:
 
     def of_whole(self, piece: Surface, whole: Surface) -> CuttingOptions:
         """The same for the whole of a piece: patches and drawn seams hold for their images, too. OptionError
-        for points [x, y] where an image of the piece has another Π."""
-        names, near = image_names(piece, whole), 1e2 * ON * whole.size
+        for a seam that goes on behind a mirror plane, and is no image of itself there, and for points [x, y]
+        where an image of the piece has another Π."""
+        names, plane = image_names(piece, whole), piece.plane
         by_patch = {key: getattr(self, key) for key in BY_PATCH if isinstance(getattr(self, key), Mapping)}
-        seams: list[Floats] = []
-        for (R, t), line in product(unfolded(piece).images if self.lines else (), self.lines):
-            plan, plane = line.shape[1] == 2, piece.plane
-            image = (np.array(plane.point) + line @ plane.axes[:2] if plan else line) @ R.T + t
-            if plan:
-                local = plane.to_local(image)
-                if (np.abs(local[:, 2]) > near).any():
+        images, near = unfolded(piece).images if self.lines else (), SAME * whole.size
+        seams: list[tuple[Floats, bool]] = []  # in space, and whether drawn in the plan
+        for (R, t), (number, line) in product(images, enumerate(self.lines, 1)):
+            plan = line.shape[1] == 2
+            points = np.array(plane.point) + line @ plane.axes[:2] if plan else line
+            for mirror in (mirror for mirror, _ in piece.on_planes if mirror.mirror):
+                away = mirror.height(points)
+                behind = points - 2.0 * away[:, None] * np.array(mirror.normal)
+                if away.min() < -near and away.max() > near and not _alike(points, behind, near):
                     text = (
-                        "seams: behind a mirror plane that leans the plan is another; give points [x, y, z]"
+                        f"seam {number}: it goes on behind the {mirror}, and its image is another one there;"
                     )
-                    raise OptionError(text, what="seams", found=line.tolist())
-                image = local[:, :2]
-            known = (other for other in seams if other.shape == image.shape)
-            if not any(np.abs(o - i).max() <= near for o in known for i in (image, image[::-1])):
-                seams.append(image)
+                    raise OptionError(f"{text} end it at the mirror", what="seams", found=line.tolist())
+            image = points @ R.T + t
+            if plan and (np.abs(plane.height(image)) > near).any():
+                text = "seams: behind a mirror plane that leans the plan is another; give points [x, y, z]"
+                raise OptionError(text, what="seams", found=line.tolist())
+            if not any(_alike(image, other, near) for other, _ in seams):
+                seams.append((image, plan))
+        found = [plane.to_local(line)[:, :2] if plan else line for line, plan in seams]
         named: dict[str, Any] = {key: with_images(given, names) for key, given in by_patch.items()}
-        return replace(self, seams=[seam.tolist() for seam in seams], **named)
+        return replace(self, seams=[line.tolist() for line in found], **named)
 
     def of_patch(self, key: str, name: str) -> Any:
         """The value of a key of ``BY_PATCH`` for a patch, by default that of the key."""
@@ -180,3 +188,12 @@ class CuttingOptions:
             return 1.0 / (1.0 + tension * along), 1.0 / (1.0 + tension * across)
         warp, weft = self.compensation or (0.0, 0.0)
         return 1.0 - warp / 100.0, 1.0 - weft / 100.0
+
+
+def _alike(one: Floats, other: Floats, near: float) -> bool:
+    """Whether two lines, of points (k,3) and (l,3), are one, in either direction."""
+    return all(
+        nearest_places(np.stack([b[:-1], b[1:], b[1:]], axis=1), point)[1].min() <= near
+        for a, b in ((one, other), (other, one))
+        for point in a
+    )

@@ -42,12 +42,14 @@ class Georeference:
             validate.number(name, getattr(self, name))
 
     def check(self, surface: Surface, units: Units) -> None:
-        """Refuse eastings or northings that the surface's own coordinates have already."""
+        """Refuse eastings, northings or a height that the surface's own coordinates have already."""
         metre = length_factor(units.length, "m")
         middle, far = metre * surface.vertices.mean(axis=0), FAR * metre * surface.size
-        for name, axis, found in zip(("eastings", "northings"), "xy", middle[:2].tolist(), strict=True):
+        for name, axis, found in zip(
+            ("eastings", "northings", "height"), "xyz", middle.tolist(), strict=True
+        ):
             given = getattr(self, name)
             if abs(given) > far and abs(found - given) < SAME * abs(given):
                 text = f"{name} = {given:.12g}: the surface is at {axis} = {found:.0f} m itself, and would be"
-                text += f" at twice the place; leave {name} out, or draw it near [0, 0]"
+                text += f" at twice the place; leave {name} out, or draw it near {axis} = 0"
                 raise OptionError(text, what=name, found=given)

@@ -201,16 +201,16 @@ def draw_picture(
     units: Units = NO_UNITS,
     mark: str = "",
 ) -> None:
-    """Draw patches, mean curvature (1/length) or its relative error as colours, or reactions as arrows."""
+    """Draw patches, Meyer's mean curvature (1/length) or its relative error as colours; or reactions."""
     check_picture(views, colour)
     if colour == "reactions":
         reactions(surface, path, view=views[0], units=units, mark=mark)
         return
     look: dict[str, Any] = {"mark": mark, "legend": colour not in ("curvature", "error")}
     if colour == "curvature":
-        look |= {"scalars": mean_curvature(surface), "label": f"mean curvature, {units.curvature}"}
+        look |= {"scalars": mean_curvature(surface), "label": f"Meyer's mean curvature, {units.curvature}"}
     elif colour == "error":
-        look |= {"scalars": curvature_error(surface), "label": "curvature error"}
+        look |= {"scalars": curvature_error(surface), "label": "error of Meyer's mean curvature, relative"}
     if len(views) == 1:
         draw(surface, path, view=views[0], **look)
     else:

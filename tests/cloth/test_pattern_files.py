@@ -220,9 +220,9 @@ def test_the_cloth_of_the_structural_model_is_the_one_that_is_cut(tmp_path):
             project.run(path)
 
 
-def test_seams_drawn_on_a_half_are_those_of_its_images(tmp_path):
+def test_seams_drawn_on_a_half_are_those_of_its_images(tmp_path, capsys):
     """Before, the whole had them on one side alone: the other half was one strip. A seam that is its own
-    image, as across the mirror, is sewn once."""
+    image, as across the mirror, is sewn once, and so is one that is drawn on both sides."""
     half = "[plan]\nedge_length = 1.0\noutline = [[0, 0], [4, 0], [4, 6], [0, 6]]\ntension = 5.0\n"
     half += "mirrors = [[[4, 0], [4, 6]]]\n"
     seams = "[pattern]\nseams = [[[0, 3], [4, 3]], [[2, 0], [2, 3]]]\n"
@@ -231,10 +231,16 @@ def test_seams_drawn_on_a_half_are_those_of_its_images(tmp_path):
         path.write_text(f'units = "m"\n{half}{seams}[output]\npattern = ["cloth.csv"]\n{whole}')
         project.run(path)
         assert len(pd.read_csv(tmp_path / "cloth.csv")) == strips
-    path.write_text(half + "[pattern]\nseams = [[[0, 3], [8, 3]]]\n")
     command = ["pattern", str(path), "--whole", "--units", "m", "-o", str(tmp_path / "cloth.csv")]
-    assert main(command) == 0
-    assert len(pd.read_csv(tmp_path / "cloth.csv")) == 2
+    for both in ("[[0, 3], [8, 3]]", "[[0, 3], [4, 3]], [[8, 3], [6, 3.001], [4, 3]]"):
+        path.write_text(f"{half}[pattern]\nseams = [{both}]\n")
+        assert main(command) == 0
+        assert len(pd.read_csv(tmp_path / "cloth.csv")) == 2
+    path.write_text(half + "[pattern]\nseams = [[[0, 3], [8, 4]]]\n")
+    assert main(command) == 2
+    assert (
+        "seam 1: it goes on behind the mirror plane 'mirror 1', and its image is" in capsys.readouterr().err
+    )
 
 
 def test_the_command_cuts_a_project(tmp_path, capsys):

@@ -296,11 +296,17 @@ def test_files_tell_that_they_hold_a_part_of_a_roof(tmp_path, monkeypatch):
 @pytest.mark.parametrize("colour", ["patches", "curvature", "error", "reactions"])
 @pytest.mark.parametrize("views", [["plan"], ["plan", "elevation"]])
 def test_a_picture_of_any_colour_has_the_mark(monkeypatch, colour, views):
-    marks, views = [], views[: 1 if colour == "reactions" else 2]
+    marks, labels, views = [], [], views[: 1 if colour == "reactions" else 2]
+
+    def seen(*_, mark, label="", **_look):
+        marks.append(mark)
+        labels.append(label)
+
     for drawn in ("draw", "panel", "reactions"):
-        monkeypatch.setattr(f"pcmc.project.writing.{drawn}", lambda *_, mark, **_look: marks.append(mark))
+        monkeypatch.setattr(f"pcmc.project.writing.{drawn}", seen)
     draw_picture(spherical_cap(0.5), "roof.png", views, colour, mark="TARGETS NOT MET")
     assert marks == ["TARGETS NOT MET"]
+    assert ("Meyer's mean curvature" in labels[0]) == (colour in ("curvature", "error"))
 
 
 def test_the_plan_drawing_is_not_written_over(tmp_path, monkeypatch):

@@ -15,7 +15,9 @@ from small_project import PLACE, changed
 import pcmc
 from pcmc import cli
 from pcmc.base.errors import FileError, OptionError, PcmcError
+from pcmc.base.units import Units
 from pcmc.io import Georeference
+from pcmc.plan import Plan
 from pcmc.project import build, load, reference, run, sections
 
 
@@ -336,19 +338,22 @@ def test_the_place_on_a_map_is_in_the_file_of_ifc_alone(small):
 
 
 def test_a_plan_drawn_on_the_map_is_not_put_there_a_second_time(small):
-    """Eastings that its coordinates have, too; in other units as well, and in what Python writes."""
+    """Eastings, or a height, that it has already; in other units as well, and in what Python writes."""
     changed(small, '"roof.obj"]', '"roof.ifc"]\n' + PLACE)
     x = [round(value / 0.3048) for value in (691_010.0, 691_014.0)]
     outline = f"outline = [[{x[0]}, 7], [{x[1]}, 7], [{x[1]}, 10], [{x[0]}, 10]]"
     changed(small, "outline = [[0, 0], [4, 0], [4, 3], [0, 3]]", outline)
     small.write_text('units = "ft"\n' + small.read_text())
     twice = "eastings = 691000: the surface is at x = 691012 m itself, and would be at twice the place;"
-    with pytest.raises(OptionError, match=re.escape(f"{twice} leave eastings out, or draw it near [0, 0]")):
+    with pytest.raises(OptionError, match=re.escape(f"{twice} leave eastings out, or draw it near x = 0")):
         run(small)
     with pytest.raises(FileError, match=f"a.ifc: {twice}"):
         pcmc.write(
             small.parent / "a.ifc", build(small), units="ft", georeference=Georeference("EPSG:25832", 691e3)
         )
+    hill = Plan([[0, 0, 518], [4, 0, 518], [4, 3, 518]], edge_length=1.0, tension=2.0).surface()
+    with pytest.raises(OptionError, match=r"height = 519.5: the surface is at z = 518 m itself.*near z = 0"):
+        Georeference("EPSG:25832", height=519.5).check(hill, Units("m"))
 
 
 @pytest.mark.parametrize(

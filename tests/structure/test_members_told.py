@@ -10,7 +10,7 @@ from refusals import refused
 from starts import spherical_cap
 from structures import FABRIC, model_of, scaled, square
 
-from pcmc import Material, StructuralModel
+from pcmc import Material, StructuralModel, solve
 from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.plan import Plan, circle, polyline
@@ -24,6 +24,7 @@ from pcmc.structure.member_forces import (
     weak_members,
 )
 from pcmc.structure.section import members_of
+from pcmc.surface.geometry import segment_lengths
 
 
 @needs_ccx
@@ -56,6 +57,26 @@ def test_the_picture_of_forces_has_a_column_per_member_and_refuses_a_wrong_name(
         member_forces(both, cases=("wind",))
     with refused(OptionError, what="analysis"):
         member_forces(analyse(model_of(square(4, tension=2.0), anyway=True)))
+
+
+def test_equal_beams_share_a_line():
+    edges = [Member(polyline([[x, 0], [x, 1]]), TUBE, STEEL, name=f"edge {x}") for x in (0, 1)]
+    told = sentences(model_of(square(8, tension=2.0), members=edges, anyway=True), Units("m", "kN"))
+    assert len(told) == 1
+    assert told[0].startswith("edge 0, edge 1: at rest N = ")
+
+
+@needs_ccx
+def test_the_diagram_of_a_ring_comes_back_to_where_it_begins(monkeypatch):
+    rim = Member(circle([0, 0], 1.0), TUBE, STEEL, propped=True, name="rim")
+    cap = solve(spherical_cap(0.4, alpha=0.6)).surface
+    monkeypatch.setattr("pcmc.plot.uses.finish", lambda figure, path: figure)
+    figure = member_forces(analyse(model_of(cap, members=[rim], anyway=True)), width=400)
+    around = segment_lengths(cap.vertices, cap.topology.edges[cap.topology.boundary_edge]).sum()
+    for axes in figure.axes:
+        s, force = axes.lines[1].get_data()
+        assert (s[0], s[-1]) == pytest.approx((0.0, around))
+        assert force[0] == force[-1]
 
 
 def test_a_member_that_cannot_be_is_refused_in_a_line():

@@ -12,7 +12,7 @@ const SIGNS = {
 export const COLOURS = {
   patches: { label: "Patches" },
   curvature: { label: "Mean curvature", name: (u) => `Mean curvature H, ${u.curvature} (walls grey)` },
-  error: { label: "Curvature error", name: () => "Error (H − H̄) / H̄ of Meyer's mean curvature, %" },
+  error: { label: "Meyer's curvature error", name: () => "Error (H − H̄) / H̄ of Meyer's mean curvature, %" },
   reactions: { label: "Reactions", name: (u) => `Reaction of the supports, ${u.tension}` },
   family: { label: "Panels" }, // the field has its own name
   difference: { label: "Difference", name: (u, than) => `Distance from ${than}, ${u.length}; positive outside it` },
