@@ -163,10 +163,10 @@ def balance_table(acting: Forces, supports: pd.DataFrame) -> pd.DataFrame:
     parts = np.array([loads, carried, loads + carried])
     if acting.surface.periodic:  # the forces across the seam have moments, and no resultant
         parts[2, 1] = np.nan
-    shares = np.abs(parts).max(axis=2) / np.where(scale > 0.0, scale, 1.0)
     pulled = float((supports["length"] * supports["per_length_max"]).sum())  # may cancel along each line
-    scale = np.maximum(scale, pulled * np.array([1.0, acting.surface.size]))
-    parts[np.abs(parts) <= FORCE_ROUNDING * scale[:, None]] = 0.0
+    most = np.maximum(scale, pulled * np.array([1.0, acting.surface.size]))
+    parts[np.abs(parts) <= FORCE_ROUNDING * most[:, None]] = 0.0
+    shares = np.abs(parts).max(axis=2) / np.where(scale > 0.0, scale, 1.0)
     values = np.column_stack([parts.reshape(3, 6), np.tile(about, (3, 1)), shares]).T
     columns = ["of", *columns, "force_share", "moment_share"]
     return pd.DataFrame(dict(zip(columns, [["loads", "supports", "remainder"], *values], strict=True)))
@@ -176,10 +176,10 @@ def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
     """How exactly the supports carry the loads, of the piece between ``mirrors`` if there are any."""
     left = table.iloc[-1]
     force, moment = left["force_share"], left["moment_share"]
-    share = f"to {force:.1g} of them in x, y and z"
+    share = f"to {force:.1g} of them in x, y and z" if force else "to rounding in x, y and z"
     if np.isnan(moment):  # of a periodic surface
         return f"the supports carry the loads {share}" if table.iloc[0][[*FORCE]].any() else ""
-    share += f", and to {moment:.1g} in moments"
+    share += f", and to {f'{moment:.1g}' if moment else 'rounding'} in moments"
     if not table.iloc[0][[*FORCE]].any():
         return f"the forces of the supports cancel {share}"
     place = point_text(left[[*"xyz"]].to_numpy(float))

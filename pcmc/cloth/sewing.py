@@ -25,7 +25,7 @@ from .strips import Seam, Side
 
 KINDS = ("seam", "junction", "mirror", "rim")  # in the order of their numbers
 SEAM_WEIGHT = 1e3  # of a seam's misfit beside the strain: squared, so that seams are equal to about 1e-9
-ROUNDS, SMALL_STEP = 50, 1e-10  # of the descent; a last step, in the size
+ROUNDS, SMALL_STEP = 50, 1e-10  # of the descent; a last step, in the size, and a strain that is none
 FOLDED = 1e6  # the strain of a triangle laid on its back
 SHORTEST = 1e-4  # part of a step that is still tried
 
@@ -246,7 +246,9 @@ def flattened(
     J = _jacobians(y, F, gradient)
     sigma = np.linalg.svd(J)[1]
     sigma[np.linalg.det(J) <= 0.0, 1] = 1.0 / (1.0 + FOLDED)  # laid on its back
-    return y, 1.0 / sigma - 1.0
+    strain = 1.0 / sigma - 1.0
+    strain[np.abs(strain) <= SMALL_STEP] = 0.0
+    return y, strain
 
 
 def _least_squares(J: csr_array, right: Floats) -> Floats:

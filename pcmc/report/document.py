@@ -93,7 +93,7 @@ class RoofReport:
             acting = png(reactions(surface, units=units, width=PIXELS))
             yield Picture("Reactions of the supports on the roof", acting)
         yield Heading("Forces")
-        yield about_forces(units)
+        yield about_forces(units, certificate)
         if self.targets is not None:
             yield tables.target_table(self.targets, units)
         yield tables.table_of_patches(surface, certificate, units)

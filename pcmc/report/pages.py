@@ -15,7 +15,15 @@ from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
 from reportlab.pdfbase.pdfmetrics import stringWidth
 from reportlab.pdfgen.canvas import Canvas
-from reportlab.platypus import Flowable, Image, KeepTogether, PageBreak, Paragraph, SimpleDocTemplate
+from reportlab.platypus import (
+    CondPageBreak,
+    Flowable,
+    Image,
+    KeepTogether,
+    PageBreak,
+    Paragraph,
+    SimpleDocTemplate,
+)
 from reportlab.platypus import Table as Grid
 
 from ..drawings.sheet import BOLD, FONT, paint_sheet
@@ -27,6 +35,7 @@ SIDE, TOP, BOTTOM = 18.0 * mm, 20.0 * mm, 17.0 * mm  # margins of a page
 WIDTH = A4[0] - 2.0 * SIDE  # between the margins
 CELL = 7.5  # points: letters of a table
 TALLEST = 118.0 * mm  # height of a picture at most
+FOLLOWING = 45.0 * mm  # of a page are free below where a heading begins: it is not alone
 
 
 @cache
@@ -91,7 +100,7 @@ def _cut(text: str, width: float) -> str:
 
 def _flowables(block: Block) -> list[Any]:
     if isinstance(block, Heading):
-        return [*([PageBreak()] if block.new_page else []), _paragraph(block.text, HEADING)]
+        return [PageBreak() if block.new_page else CondPageBreak(FOLLOWING), _paragraph(block.text, HEADING)]
     if isinstance(block, str):
         return [_paragraph(block, TEXT)]
     if isinstance(block, PaperPlan):

@@ -33,6 +33,8 @@ LEGEND = (  # of the plan
 )
 ERROR_BARS = "An error bar estimates how far the limit on finer and finer meshes may be from the number."
 
+SEEN = 5e-5  # of a number: less is not seen in its four digits
+
 
 def verdict_sentences(
     certificate: Certificate,
@@ -81,13 +83,17 @@ def sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}."
 
 
-def about_forces(units: Units) -> str:
-    """How the signs and units of the tables are meant."""
+def about_forces(units: Units, certificate: Certificate) -> str:
+    """How the signs and units of the tables are meant, and how far reactions differ from loads."""
     force = units.force or "the unit of force of the tensions"
     text = (
         f"Lengths are in {units.length}, forces in {force}. Reactions are the forces of the supports on the"
     )
-    return f"{text} roof: z is up, so a negative z holds the roof down."
+    text += " roof: z is up, so a negative z holds the roof down."
+    if len(certificate.supports) and (share := certificate.balance["force_share"].iloc[-1]) > SEEN:
+        text += f" Their sum differs from that of the loads by {100.0 * share:.1g} %, the remainder of the"
+        text += " balance: the mesh leaves it along its sheets, and finer triangles make it smaller."
+    return text
 
 
 def panel_text(schedule: Panels, units: Units) -> str:

@@ -222,13 +222,14 @@ def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tupl
 
 
 def sentences(model: StructuralModel, units: Units) -> list[str]:
-    """For each beam in a line: what it carries at rest, how stiff it must be, and what would not bend."""
-    lines, force, length = list[str](), units.behind("force"), units.behind("length")
+    """For each beam in a line: what it carries at rest, how stiff it must be, and what would not bend. Equal
+    beams share a line."""
+    told, force, length = dict[str, list[str]](), units.behind("force"), units.behind("length")
     moment = f"{force}·{units.length}" if units else ""
     for beam in members_at_rest(model):
         (N, share), most = beam.balance, beam.largest
         M, far = most["M"], max(most["least_N"], most["largest_N"], key=abs)
-        about = f"{beam.line.name}: at rest N = {far:.3g}{force}, M up to {M:.3g}{moment}"
+        about = f"at rest N = {far:.3g}{force}, M up to {M:.3g}{moment}"
         about += f", M/N = {M / abs(far):.2g}{length}" if far else ""
         stiff = f"{beam.enough:.3g} times its E A and E I keep the deflection below 1/{LIMIT:.0f} of the span"
         about += f"; {floating(model, beam, units) or f'{stiff} (the member alone)'}"
@@ -238,8 +239,8 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
             low, high = np.nanmin(beam.wall_tensions[:, 1]), np.nanmax(beam.wall_tensions[:, 1])
             about += f"; without bending a wall would pull with {low:.3g} to {high:.3g}"
             about += units.behind("tension") + "; N is a thrust, which no cable has" * (N <= 0.0)
-        lines.append(about)
-    return lines
+        told.setdefault(about, []).append(beam.line.name)
+    return [f"{', '.join(names)}: {about}" for about, names in told.items()]
 
 
 def floating(model: StructuralModel, beam: MemberForces, units: Units) -> str:

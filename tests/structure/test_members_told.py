@@ -59,6 +59,13 @@ def test_the_picture_of_forces_has_a_column_per_member_and_refuses_a_wrong_name(
         member_forces(analyse(model_of(square(4, tension=2.0), anyway=True)))
 
 
+def test_equal_beams_share_a_line():
+    edges = [Member(polyline([[x, 0], [x, 1]]), TUBE, STEEL, name=f"edge {x}") for x in (0, 1)]
+    told = sentences(model_of(square(8, tension=2.0), members=edges, anyway=True), Units("m", "kN"))
+    assert len(told) == 1
+    assert told[0].startswith("edge 0, edge 1: at rest N = ")
+
+
 @needs_ccx
 def test_the_diagram_of_a_ring_comes_back_to_where_it_begins(monkeypatch):
     rim = Member(circle([0, 0], 1.0), TUBE, STEEL, propped=True, name="rim")
