@@ -227,7 +227,6 @@ def folded_over(surface: Surface, pinchable: Bools) -> str:
     free[topo.edges_of((pinchable | ~counts)[surface.patch_of_face])] = False
     sides = topo.neighbours[free[topo.valence == 2]]
     one, other = area_vectors(surface.vertices[surface.faces])[sides.T // 3]
-    one[topo.one_way_edge[topo.edge_of_face.ravel()[sides[:, 0]]]] *= -1.0
     sizes = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
     back = np.einsum("ij,ij->i", one, other) < np.cos(np.radians(FOLDED)) * sizes
     if not back.any():
