@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import Floats, Ints
 from ..base.tolerances import ON
 from ..certificate import Certificate
-from ..certificate.supports import FORCE, held_lines, support_vertices
+from ..certificate.supports import FORCE, line_rows, support_vertices
 from ..forces.rooms import closing_volumes, prescribed_volumes, room_pressures
 from ..forces.volume_below import volume_below
 from ..surface import Surface
@@ -113,7 +113,7 @@ def _held_lines(surface: Surface, certificate: Certificate) -> Iterator[tuple[In
     Of several lines of one name, each is named with its place; those around one centre with the number of
     their support, too.
     """
-    table = certificate.supports.iloc[held_lines(certificate.acting)]
+    table = certificate.supports.iloc[line_rows(certificate.acting)]
     on, names = support_vertices(certificate.acting), table["name"].astype(str).tolist()
     middles, forces = (table[[*columns]].to_numpy() for columns in ("xyz", FORCE))
     near = [f"{name} near {point_text(at, surface.size)}" for name, at in zip(names, middles, strict=True)]

@@ -94,12 +94,12 @@ def support_vertices(acting: Forces) -> dict[str, Ints]:
     return {part.label: part.vertices for part in _labelled(acting)}
 
 
-def held_lines(acting: Forces) -> Ints:
+def line_rows(acting: Forces) -> Ints:
     """(k,) the rows of the table of supports that are curves of the held boundary, and held lines inside.
 
     >>> from pcmc import Patch, Surface
     >>> flat = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [0], [Patch("a", 1.0)], fixed=range(3))
-    >>> held_lines(Forces.of(flat)).tolist()
+    >>> line_rows(Forces.of(flat)).tolist()
     [0]
     """
     boundary = len(held_curves(acting.surface))
