@@ -33,6 +33,7 @@ from ..surface.supports import apply_supports, symmetric_part
 from ..surface.topology import EdgeCurve
 
 DAMPED = 1e-4  # of 1: bends that the next triangles do not tell stay small
+NARROW = 0.02  # of a triangle and the next ones: no bend is told by one with a side or height below it
 
 CableEnd = tuple[Cable, int, Floats]
 
@@ -128,7 +129,7 @@ class Forces:
 
         >>> from pcmc import Patch
         >>> square = Surface([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]],
-        ...                  [0, 0], [Patch("floor", 1.0)], fixed=range(4))
+        ...                  [0, 0], [Patch("floor", 1.0, pressure=0.0)], fixed=range(4))
         >>> acting = Forces.of(square)
         >>> acting.reactions[1].tolist()[:2], acting.pulls[0].tolist()  # the edge from (1, 1) to (-1, 1)
         ([-1.0, 1.0], [0.0, 1.0, 0.0])
@@ -278,14 +279,18 @@ class SheetSides(NamedTuple):
         tension = alpha + weight * ((middle - np.array(self.plane.point)) @ up)
         t, length = _unit(X[:, 2] - X[:, 1])
         n, height = _unit(middle - X[:, 0] + _dot(X[:, 0] - middle, t) * t)
-        normal = np.cross(n, t)
-        x, y, z = (_dot(X - middle[:, None], axis[:, None])[:, :, 0] / length for axis in (t, -n, normal))
+        normal, away = np.cross(n, t), X - middle[:, None]
+        least = NARROW * np.abs(away.real).max(axis=(1, 2))
+        thin = np.minimum(length[:, 0].real, height[:, 0].real) <= least
+        away = np.where(thin[:, None, None], 0.0, away)
+        size = np.where(thin, 1.0, length[:, 0])
+        x, y, z = (_dot(away, axis[:, None])[:, :, 0] / size[:, None] for axis in (t, -n, normal))
         terms = np.stack([0.5 * x * x, 0.5 * y * y, x * y], axis=2)
-        high = y[:, 0] + (height[:, 0] == 0.0)
+        high = np.where(thin, 1.0, y[:, 0])
         rise = terms[:, 0] - terms[:, 1]
         # of a and b all terms are the same: the plane through them and c has no slope along x
         beyond = terms[:, 3:] - terms[:, 1:2] - (y[:, 3:] / high[:, None])[:, :, None] * rise[:, None]
-        trace = (weight * (normal @ up) - pressure) / np.where(tension == 0.0, 1.0, tension) * length[:, 0]
+        trace = (weight * (normal @ up) - pressure) / np.where(tension == 0.0, 1.0, tension) * size
         rows = np.concatenate([np.broadcast_to([[[1.0, 1.0, 0.0]]], beyond[:, :1].shape), beyond], axis=1)
         back, right = rows.swapaxes(1, 2), np.column_stack([trace, z[:, 3:]])[:, :, None]
         bends = np.linalg.solve(back @ rows + DAMPED * np.eye(3), back @ right)[:, :, 0]

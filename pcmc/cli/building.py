@@ -80,10 +80,8 @@ def structure(
                     name: {key: value for key, value in table.items() if key != "thickness"}
                     for name, table in values["patches"].items()
                 }
-            one = set(thick.values()) if len(thick) == len(patches) else ()
-            values["thickness"] = (
-                thick[patches[0]] if len(one) == 1 else thick
-            )  # one number, not one by patch
+            alike = thick.keys() == {*patches} and len({*thick.values()}) == 1  # one number, not one by patch
+            values["thickness"] = thick[patches[0]] if alike else thick
         if given.wind:
             values["wind"] = values.get("wind", {}) | arguments.by_name(patches, given.wind, "--wind")
         wanted = Structure(**values)

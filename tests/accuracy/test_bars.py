@@ -186,7 +186,7 @@ def test_the_top_of_a_paraboloid_in_a_mirror_plane_is_found_between_its_vertices
     rim = (x == 1.0) | (np.abs(y) == 1.0)
     half = Surface(X, Delaunay(X[:, :2]).simplices, [0] * 100, [Patch("roof", 1.0)], fixed=rim,
                    on_planes={mirror: ~rim & (x == 0.0)})  # fmt: skip
-    height = readings(half, certify(half), half.n)["height", "roof", (), b""]
+    height = readings(half, certify(half), half.n)["height", "roof", "", b""]
     assert height.value < 0.9998
     assert height.estimate == pytest.approx(1.0, abs=1e-12)
 
