@@ -212,11 +212,11 @@ def accuracies(given: Any) -> dict[str, float]:
 
 
 def check_places(wanted: Mapping[str, float], surface: Surface) -> None:
-    """Refuse a quantity of a patch that the surface does not have."""
+    """Refuse a quantity of a patch that the surface does not have, or of a line between such patches."""
     for name in wanted:
-        _, of, patch = name.partition(" of ")
-        if of:
-            surface.patch_index(patch.partition(" near ")[0])
+        _, of, place = name.partition(" of ")
+        for patch in place.partition(" near ")[0].removesuffix(", inside").split(" | ") if of else ():
+            surface.patch_index(patch)
 
 
 def goals_in(table: pd.DataFrame, wanted: Mapping[str, float]) -> dict[Goal, float]:

@@ -222,17 +222,17 @@ def folded_over(surface: Surface, pinchable: Bools) -> str:
     tension and weight are left out: their area counts for nothing.
     """
     topo, counts = surface.topology, (surface.tensions != 0.0) | (surface.weights != 0.0)
-    free = ~(topo.seam_edge | surface.fixed[topo.edges].all(axis=1))
+    free = ~(topo.seam_edge | (surface.fixed[topo.edges[:, 0]] & surface.fixed[topo.edges[:, 1]]))
     free[topo.edge_numbers(surface.cable_edges.ends)] = False
     free[topo.edges_of((pinchable | ~counts)[surface.patch_of_face])] = False
     sides = topo.neighbours[free[topo.valence == 2]]
-    one, other = area_vectors(surface.vertices[surface.faces])[sides.T // 3]
-    one[topo.one_way_edge[topo.edge_of_face.ravel()[sides[:, 0]]]] *= -1.0
-    sizes = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
-    back = np.einsum("ij,ij->i", one, other) < np.cos(np.radians(FOLDED)) * sizes
+    (one, other), vectors = sides.T // 3, area_vectors(surface.vertices[surface.faces])
+    sizes = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+    cosines = np.einsum("ij,ij->i", vectors[one], vectors[other])
+    back = cosines < np.cos(np.radians(FOLDED)) * sizes[one] * sizes[other]
     if not back.any():
         return ""
-    face = sides[back.argmax(), 0] // 3
+    face = one[back.argmax()]
     name = surface.patches[surface.patch_of_face[face]].name
     place = point_text(surface.vertices[surface.faces[face]].mean(axis=0), surface.size)
     text = (

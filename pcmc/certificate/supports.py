@@ -176,10 +176,10 @@ def balance_sentence(table: pd.DataFrame, mirrors: Sequence[str] = ()) -> str:
     """How exactly the supports carry the loads, of the piece between ``mirrors`` if there are any."""
     left = table.iloc[-1]
     force, moment = left["force_share"], left["moment_share"]
-    share = f"to {force:.1g} of them in x, y and z" if force else "to rounding in x, y and z"
+    share = f"to {force:.1g} of them in x, y and z"
     if np.isnan(moment):  # of a periodic surface
         return f"the supports carry the loads {share}" if table.iloc[0][[*FORCE]].any() else ""
-    share += f", and to {f'{moment:.1g}' if moment else 'rounding'} in moments"
+    share += f", and to {moment:.1g} in moments"
     if not table.iloc[0][[*FORCE]].any():
         return f"the forces of the supports cancel {share}"
     place = point_text(left[[*"xyz"]].to_numpy(float))

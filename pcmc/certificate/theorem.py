@@ -245,16 +245,19 @@ def _rests(
     if meet.any():  # there the largest pull over capacity is found by iteration, without a bound
         where = f"walls meet at resting vertex {meet.argmax()}"
         raise _Unproved(f"{where}, and what they hold there has no bound")
-    if len(over := spans(part.surface, walls, resting)):  # their forces are left out, without a bound
+    if len(over := spans(part)):  # their forces are left out, without a bound
         face = part.surface.faces[over[0]]
         where = f"a wall stands on vertex {face[~(resting | walls.corner)[face]][0]}"
         raise _Unproved(f"{where} between two that rest, whose pull has no bound")
-    pull, capacity = pull_and_capacity(part.surface, walls, resting, -found.forces[:n])
+    pull, capacity = pull_and_capacity(part, -found.forces[:n])
     size = np.linalg.norm(found.forces[:n], axis=1)
     off = np.linalg.norm(found.forces_radius[:n], axis=1) + 2.0 * stiffness[:n] * radius + 1e-14 * size
     lost = np.zeros(n)
+    far = float(np.linalg.norm(surface.vertices - surface.origin, axis=1).max())
+    pressures = np.abs(surface.net_pressures[walls.wall_below])  # under a top edge they push by ⅙ p x × y
+    moved = (surface.tensions[walls.wall_below] + pressures * far) * radius + 1e-14 * pressures * far**2
     for end in walls.top_edges.T:  # both ends of a top edge may move by the radius
-        np.add.at(lost, end, surface.tensions[walls.wall_below] * radius)
+        np.add.at(lost, end, moved)
     spare = (capacity * (1.0 - 1e-12) - lost - np.abs(pull) - off * SAFE)[resting]
     worst = int(spare.argmin())
     if not spare[worst] > 0.0:

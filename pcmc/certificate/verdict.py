@@ -39,7 +39,7 @@ class Verdict(Enum):
     RAN_AWAY = "ran away from this start: another start may come to rest; nothing proves that none does"
     UNDECIDED = "undecided: rounding hides whether it is at rest, or stable; the detail has the reason"
     WALL_DOWN = "wall down: a junction comes down on the held bottom of its wall, where it cannot rest"
-    DEGENERATE = "degenerate mesh: triangles have collapsed, or are folded; remesh, or start elsewhere"
+    DEGENERATE = "degenerate mesh: triangles are collapsed or folded; remesh, or start from another shape"
 
 
 class Evidence(Enum):

@@ -17,6 +17,7 @@ from ..base.arrays import Floats
 from ..base.libraries import require
 from ..base.validate import one_line
 from ..certificate import Certificate
+from ..surface.geometry import lengths_along
 
 FORMATS = {"A4": (210.0, 297.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0)}
 FORMATS["A0"] = (1189.0, 841.0)
@@ -32,6 +33,7 @@ DIGITS = 4  # of the largest number of a column, and of the size of a small roof
 MISSED = "TARGETS NOT MET"  # mark of a roof that misses them
 MARGIN, STRIP = 10.0, 16.0  # mm: around the frame; height of the title strip within it
 GAP = 8.0  # mm between views
+NEAR = 0.5  # mm between points of a line that texts keep off
 TINY, SMALL, LARGE = 1.8, 2.5, 3.5  # mm: heights of letters
 WIDTH = 0.72  # of a letter, in its height, for what must fit
 
@@ -177,9 +179,13 @@ class Sheet:
 
 
 def place_labels(
-    labels: Sequence[Text], others: Sequence[Text], rings: int = 6, needed: bool = True
+    labels: Sequence[Text],
+    others: Sequence[Text],
+    lines: Sequence[SheetLine] = (),
+    rings: int = 6,
+    needed: bool = True,
 ) -> list[Text]:
-    """Labels at or beside their places, so that none covers another text.
+    """Labels at or beside their places, so that none covers another text; nor a line, where there is room.
 
     One without room within ``rings`` steps of its height stays if it is ``needed``, else it is left out.
     """
@@ -187,17 +193,28 @@ def place_labels(
     steps = steps[np.hypot(*steps.T).argsort(kind="stable")]
     boxes, count, placed = np.empty((len(others) + len(labels), 2, 2)), len(others), []
     boxes[:count] = np.array([box(text) for text in others]).reshape(-1, 2, 2)
+    drawn = np.concatenate([np.empty((0, 2)), *map(_points_along, lines)])
     for label in labels:
         tries = box(label) + 0.8 * label.height * steps[:, None]
         low, high = tries.min(axis=(0, 1)), tries.max(axis=(0, 1))
         taken = boxes[:count]
         near = taken[((low < taken[:, 1]) & (taken[:, 0] < high)).all(axis=1)]
         covers = ((tries[:, None, 0] < near[:, 1]) & (near[:, 0] < tries[:, None, 1])).all(axis=2).any(axis=1)
+        on = drawn[((low < drawn) & (drawn < high)).all(axis=1)]
+        crossed = ((tries[:, None, 0] < on) & (on < tries[:, None, 1])).all(axis=2).any(axis=1)
         if needed or not covers.all():
-            k = int(covers.argmin())
+            k = int((2 * covers + crossed).argmin())
             placed.append(label._replace(at=label.at + tries[k, 0] - box(label)[0]))
             boxes[count], count = tries[k], count + 1
     return placed
+
+
+def _points_along(line: SheetLine) -> Floats:
+    """(k,2) points of a line, so near that no text is between them."""
+    path = np.concatenate([line.points, line.points[: int(line.closed)]])
+    along = lengths_along(path)
+    at = np.linspace(0.0, along[-1], 2 + int(along[-1] / NEAR))
+    return np.stack([np.interp(at, along, x) for x in path.T], axis=1)
 
 
 def width(text: str, height: float = SMALL) -> float:

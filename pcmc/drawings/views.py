@@ -222,8 +222,9 @@ def _add(sheet: Sheet, view: DrawnView, factor: float, shift: Floats) -> None:
             marks.append(Text(place, "##", align="C"))  # kept free of names
         beside = place + np.array([half + 0.3, half + 0.6 * height])
         (small if layer == "PCMC-POINT" else large).append(Text(beside, name, height, layer))
-    sheet.texts += place_labels(large, sheet.drawn()[1])
-    sheet.texts += place_labels(small, [*sheet.drawn()[1], *marks], rings=2, needed=False)
+    kept = [line for line in sheet.lines if line.layer != "PCMC-PANEL"]
+    sheet.texts += place_labels(large, sheet.drawn()[1], kept)
+    sheet.texts += place_labels(small, [*sheet.drawn()[1], *marks], kept, rings=2, needed=False)
 
 
 def _add_dimensions(sheet: Sheet, view: DrawnView, factor: float, shift: Floats, decimals: int) -> None:

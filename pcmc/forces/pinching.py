@@ -30,7 +30,7 @@ from ..surface.geometry import area_vectors, edge_vectors, segment_lengths, unit
 from ..surface.images import expect_no_images
 from ..surface.supports import apply_supports
 from ..surface.topology import topology
-from .functional import energy_and_gradient
+from .functional import energy_and_gradient, weighted
 from .motion_space import MotionSpace, VertexClasses, vertex_classes
 from .triangles import effective_tensions
 from .wall_rows import WallRows, Walls, find_walls
@@ -298,46 +298,58 @@ def under_low(rows: WallRows, low: Bools) -> Bools:
     return (low[i] | (rows.fraction == 1.0)) & (low[j] | (rows.fraction == 0.0))
 
 
-def pull_and_capacity(
-    surface: Surface, walls: Walls, resting: Bools, force: Floats | None = None
-) -> tuple[Floats, Floats]:
-    """Pull (n,) on each resting vertex of a standing part and what the wall can take, force.
+def pull_and_capacity(part: StandingPart, force: Floats | None = None) -> tuple[Floats, Floats]:
+    """Pull (n,) on each resting vertex and what the wall can take, force.
 
     The pull is the force of the sheets away from Π, to the vertex's own side; negative to the other.
     Lifting the vertex by dz to either side makes a wall of area ½ ℓ dz under each top edge there, ℓ
     its length along Π, so the capacity is ½ Σ α_w ℓ; the vertex rests while |pull| ≤ capacity.
     On a held bottom the pull is the force along the direction d of ``pull_directions``, and ℓ is taken on the
-    bottom; where walls meet, the area is ½ ℓ |d × e| for an edge along e. The area of ``spans`` is no pull.
+    bottom; where walls meet, the area is ½ ℓ |d × e| for an edge along e. See ``_lifting_forces``.
     ``force`` (n,3) is -∇E without supports, if that is known.
     """
-    force = -energy_and_gradient(surface, supports=False)[1] if force is None else force
-    d = pull_directions(surface, walls, resting, force)
-    force = _without_spans(surface, walls, resting, force)
-    pull = np.where(resting, np.einsum("ij,ij->i", force, d), 0.0)
-    vertex, half, along = _edge_ends(surface, walls)
+    force = -energy_and_gradient(part.surface, supports=False)[1] if force is None else force
+    d = pull_directions(part, force)
+    pull = np.where(part.resting, np.einsum("ij,ij->i", _lifting_forces(part, force), d), 0.0)
+    vertex, half, along = _edge_ends(part.surface, part.walls)
     across = np.linalg.norm(np.cross(d[vertex], along), axis=1)
-    capacity = np.bincount(vertex, half * np.where(walls.meeting[vertex], across, 1.0), surface.n)
-    return pull, np.where(resting, capacity, 0.0)
+    half = half * np.where(part.walls.meeting[vertex], across, 1.0)
+    return pull, np.where(part.resting, np.bincount(vertex, half, part.whole.n), 0.0)
 
 
-def spans(surface: Surface, walls: Walls, resting: Bools) -> Ints:
+def spans(part: StandingPart) -> Ints:
     """(k,) the standing triangles of walls that reach from one resting vertex to another, over the bottom of
     what stands between: lifting one of them leaves that bottom where it is, and so their area."""
-    low = resting | walls.corner
-    within = walls.pinchable[surface.patch_of_face]
+    low, surface = part.resting | part.walls.corner, part.surface
+    within = part.walls.pinchable[surface.patch_of_face]
     return np.flatnonzero(within & (low[surface.faces].sum(axis=1) == 2))
 
 
-def _without_spans(surface: Surface, walls: Walls, resting: Bools, force: Floats) -> Floats:
-    """The forces (n,3) without those of the area of ``spans``: -½ α ν × e, e the side opposite."""
-    chosen = spans(surface, walls, resting)
-    if not len(chosen):
-        return force
-    F, P = surface.faces[chosen], surface.vertices[surface.faces[chosen]]
-    tension = effective_tensions(surface, surface.vertices, F, surface.patch_of_face[chosen])
-    own = -0.5 * tension[:, None, None] * np.cross(unit_vectors(area_vectors(P))[:, None], edge_vectors(P))
-    left = force.copy()
-    np.subtract.at(left, F, own)
+def _lifting_forces(part: StandingPart, force: Floats) -> Floats:
+    """The forces (n,3) -∇E on a standing part, at resting vertices those that lift them off their bottoms.
+
+    There they are without those of the area of ``spans``, -½ α ν × e, e the side opposite, and with the
+    pressure on the walls of the whole surface, as far as their vertices follow a lift, for that on what
+    stands of them. Along a top edge it balances the pressures of the sheets to either side, where these
+    differ; on the feet the bottom carries it.
+    """
+    surface, walls, rows = part.surface, part.walls, part.walls.rows
+    left, chosen = force, spans(part)
+    if len(chosen):
+        left, F = force.copy(), surface.faces[chosen]
+        P = surface.vertices[F]
+        tension = effective_tensions(surface, surface.vertices, F, surface.patch_of_face[chosen])
+        edges = edge_vectors(P)
+        own = -0.5 * tension[:, None, None] * np.cross(unit_vectors(area_vectors(P))[:, None], edges)
+        np.subtract.at(left, F, own)
+    pressures = np.where(walls.pinchable, surface.net_pressures, 0.0)
+    if pressures.any():
+        standing, whole = (weighted(each, pressures=pressures)[1] for each in (surface, part.whole))
+        gone = np.flatnonzero(~mask_of(surface.faces, surface.n)[rows.vertices])
+        below = rows.relative_height[gone, None] * whole[rows.vertices[gone]]
+        left = left + np.where(part.resting[:, None], standing - whole, 0.0)
+        for end, share in enumerate((1.0 - rows.fraction[gone], rows.fraction[gone])):
+            np.subtract.at(left, rows.top_ends[gone, end], share[:, None] * below)
     return left
 
 
@@ -353,28 +365,29 @@ def _edge_ends(surface: Surface, walls: Walls) -> tuple[Ints, Floats, Floats]:
     return walls.top_edges.T.ravel(), np.tile(half, 2), np.tile(along, (2, 1))
 
 
-def excess_pull(surface: Surface, walls: Walls, resting: Bools, force: Floats) -> Floats:
-    """(n,) the pull on each resting vertex of a standing part beyond what its wall can take, force.
+def excess_pull(part: StandingPart, force: Floats) -> Floats:
+    """(n,) the pull on each resting vertex beyond what its wall can take, force.
 
     Zero at equilibrium: a junction that is pulled harder stands off Π. Signed as the pull is.
     """
-    pull, capacity = pull_and_capacity(surface, walls, resting, force)
+    pull, capacity = pull_and_capacity(part, force)
     beyond = np.where(np.abs(pull) > capacity * (1.0 + EXCESS), np.abs(pull) - capacity, 0.0)
     return np.copysign(beyond, pull)
 
 
-def pull_directions(surface: Surface, walls: Walls, resting: Bools, force: Floats) -> Floats:
-    """(n,3) the unit direction to lift each vertex of a standing part: off Π, or as a held one is pulled.
+def pull_directions(part: StandingPart, force: Floats) -> Floats:
+    """(n,3) the unit direction to lift each vertex: off Π, or as a held one is pulled.
 
     Where held walls meet, they resist a motion d by h(d) = Σ c |d × e|, c = ½ α_w ℓ, most where it is across
     all of them. The direction is the one of the largest ⟨f, d⟩ / h(d): there f ∝ M d, M = Σ c (1 - e eᵀ) /
     |d × e|, a fixed point (Weiszfeld's). An upright plane takes what is across it.
     """
+    surface, walls, resting = part.surface, part.walls, part.resting
     direction = walls.side[:, None] * np.array(surface.plane.normal)
     held = resting & walls.held
     if not held.any():
         return direction
-    force = _without_spans(surface, walls, resting, force)
+    force = _lifting_forces(part, force)
     pull = walls.across_bottom(force, surface.vertices)
     length = np.linalg.norm(pull, axis=1)
     pulled = held & (length > 0.0)

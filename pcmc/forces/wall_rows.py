@@ -206,7 +206,8 @@ def _held_feet(surface: Surface, top_edges: Ints, bottom_edges: Ints) -> Ints | 
         return None
     if sum(map(np.size, ends)) == 0:
         loose = [np.flatnonzero(np.bincount(edges.ravel()) == 1) for edges in (top_edges, bottom_edges)]
-        above, below = map(np.atleast_2d, loose) if min(map(len, loose)) == 2 else (top_edges, bottom_edges)
+        hangs = [*map(len, loose)] == [2, 2]
+        above, below = map(np.atleast_2d, loose) if hangs else (top_edges, bottom_edges)
         ways, X = np.concatenate([below, below[:, ::-1]]), surface.vertices
         apart, way = map(np.asarray, cKDTree(X[ways].reshape(-1, 6)).query(X[above].reshape(-1, 6)))
         ends = [np.array([above[apart.argmin()], ways[way[apart.argmin()]]])]

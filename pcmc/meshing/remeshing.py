@@ -17,7 +17,7 @@ from ..base.errors import MissingExtra, OptionError, SurfaceError
 from ..forces.curvature import mean_curvature
 from ..forces.pinching import lift, standing_part
 from ..surface import Surface
-from ..surface.geometry import angles, face_areas, segment_lengths
+from ..surface.geometry import angles, area_vectors, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import two_digits
 from ..surface.topology import SIDES, edge_places
@@ -26,6 +26,7 @@ from .quality import edge_lengths, improve_angles
 from .refinement import Projection
 
 CHORD = 0.1  # of the edge length
+ROUNDED = 1e-3  # of the edge length: sides of an area vector that is none, as of a closed patch
 SHORTEST = 0.3  # of the edge length: no edge of MMG gets shorter
 BEYOND = 2.0  # times the chord wanted: where these edges are farther off, MMG gives up or never ends
 MOST = 20_000_000  # triangles; more mean a mistake in the edge length
@@ -199,6 +200,11 @@ def _remesh_with_mmg(mesh: CurveMesh, size: Floats, growth: float, chord: float)
     if not np.isin(patch, mesh.patch + 1).all():
         message = "MMG cannot remesh this surface; repair its triangles first, or choose another edge length"
         raise SurfaceError(message, what="surface")
+    before, after = np.zeros((2, int(mesh.patch.max()) + 1, 3))
+    np.add.at(before, mesh.patch, area_vectors(mesh.X[mesh.F]))
+    np.add.at(after, patch - 1, area_vectors(X[F]))  # the same, as the rims are, or turned over as a whole
+    turned = (before * after).sum(axis=1) < -((ROUNDED * float(size.max())) ** 4)
+    F = np.where(turned[patch - 1, None], F[:, ::-1], F)
     origin, known, number = np.append(-1, fixed)[reference], reference > 0, np.full(len(mesh.X), -1)
     number[origin[known]] = np.flatnonzero(known)
     curves = number[mesh.curves]

@@ -78,6 +78,7 @@ def build_surface(plan: Plan) -> Surface:
     roof = Roof(to_space(raised, plan.plane), base, fixed, laws, room_of_face)
     walls, wall_patches, sides = walls_of(draft, roof)
     vertices = np.concatenate([roof.positions, walls.vertices])
+    still = np.concatenate([fixed, walls.fixed])
     uprights = upright_planes(draft, walls, sides)
     planes = (*mirror_planes(plan, vertices), *uprights)
     # where a line ends on an upright one, its end may be off it by the digits that were typed
@@ -89,13 +90,13 @@ def build_surface(plan: Plan) -> Surface:
         np.concatenate([mesh.triangles, walls.faces]),
         np.concatenate([patch_of_face, walls.label + len(patches)]),
         (*patches, *wall_patches),
-        np.concatenate([fixed, walls.fixed]),
+        still,
         np.concatenate([sliding, walls.sliding]),
         plan.plane,
         on_planes=planes,
         cables=tuple(cables),
         rooms=tuple(rooms_between(plan, wall_patches, sides)),
-        curves=(*held_lines(draft, vertices, walls.feet), *walls.uprights),
+        curves=(*held_lines(draft, vertices, walls.feet, still), *walls.uprights),
     )
     try:
         check_rooms(surface)
@@ -320,10 +321,13 @@ def _solve(L: csr_array, load: Floats, known: Bools) -> Floats:
     return u
 
 
-def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) -> list[HeldCurve]:
+def held_lines(
+    draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints], still: Bools
+) -> list[HeldCurve]:
     """The fixed edges of outline and holes, the lines of supports, and straight feet of walls, on X (n,3).
 
-    ``feet``: by the first two vertices of the upper edge of a wall, the vertices along its held bottom.
+    ``feet``: by the first two vertices of the upper edge of a wall, the vertices along its held bottom;
+    ``still`` (n,): the fixed vertices.
     """
     curves, edges = [], draft.edges
     supports = [PlanLine("support", Kind.SUPPORT, curve) for curve in draft.supports_on_edge]
@@ -344,8 +348,12 @@ def held_lines(draft: Draft, X: Floats, feet: Mapping[tuple[int, int], Ints]) ->
             curves.append(found or HeldCurve(polyline(X[V]), V, np.arange(float(len(V)))))
     for chain in draft.drawn.chains:
         if (foot := feet.get((int(chain.vertices[0]), int(chain.vertices[1])))) is not None:
-            curve = draft.lines[chain.line].curve.mapped(np.diag([1.0, 1.0, 0.0]), np.zeros(3))
-            curves += filter(None, [_on_curve(draft, curve, foot, chain.at, X)])
+            line = draft.lines[chain.line]
+            curve = line.curve.mapped(np.diag([1.0, 1.0, 0.0]), np.zeros(3))
+            found = _on_curve(draft, curve, foot, chain.at, X)
+            if found is not None and not still[foot].all():
+                raise line.error('ends on an edge that slides; give it bottom = "sliding", or hold that edge')
+            curves += filter(None, [found])
     return curves
 
 

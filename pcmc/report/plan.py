@@ -47,15 +47,16 @@ def paper_plan(surface: Surface, certificate: Certificate, units: Units) -> Pape
     lines += marks[len(sheet.lines) :]
     ((factor, shift),) = sheet.places
     supports, own = certificate.supports[["x", "y"]].to_numpy(), support_vertices(certificate.acting).items()
-    labels = []
+    marked = []
     if len(certificate.junctions):
         middles = certificate.junctions[["middle_x", "middle_y"]].to_numpy()
         curves = zip(certificate.acting.standing.topology.junctions, middles, strict=True)
-        labels = [(f"J{k}", at, curve.vertices, "PCMC-RIDGE") for k, (curve, at) in enumerate(curves, 1)]
-    labels += [(name, at, on, "PCMC-SUPPORT") for (name, on), at in zip(own, supports, strict=True)]
-    places = [factor * _beside(surface, at, on) + shift for _, at, on, _ in labels]
-    named = zip(labels, places, strict=True)
-    texts += place_labels([Text(at, name, layer=layer, align="C") for (name, *_, layer), at in named], texts)
+        marked = [(f"J{k}", at, curve.vertices, "PCMC-RIDGE") for k, (curve, at) in enumerate(curves, 1)]
+    marked += [(name, at, on, "PCMC-SUPPORT") for (name, on), at in zip(own, supports, strict=True)]
+    places = [factor * _beside(surface, at, on) + shift for _, at, on, _ in marked]
+    named = zip(marked, places, strict=True)
+    labels = [Text(at, name, layer=layer, align="C") for (name, *_, layer), at in named]
+    texts += place_labels(labels, texts, [line for line in lines if line.layer != "PCMC-PANEL"])
     return on_paper(sheet.scale, lines, texts)
 
 

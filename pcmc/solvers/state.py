@@ -224,7 +224,8 @@ class SolverState:
             return False
         self._releases_left -= 1
         walls = replace(self.walls, side=np.where(excess < 0.0, -self.walls.side, self.walls.side))
-        directions = pull_directions(self.at.shape, walls, resting, -self.at.gradient_with_reactions)
+        sides = replace(self.at.part_here, walls=walls)
+        directions = pull_directions(sides, -self.at.gradient_with_reactions)
         again, rows = lifted & (self._damping < 1.0), walls.rows
         bent = ~again[rows.top_ends].any(axis=1)
         walls = replace(walls, rows=replace(rows, offset=rows.offset * bent[:, None]))

@@ -95,6 +95,11 @@ class Equilibrium:
         """The standing surface with its vertices at X."""
         return self.surface if self.X is self.surface.vertices else self.surface.moved(self.X)
 
+    @property
+    def part_here(self) -> StandingPart:
+        """The standing part with its vertices, and those of the whole surface, at X."""
+        return replace(self.part, whole=self.part.whole_at(self.X), surface=self.shape)
+
     # At rest
 
     @cached_property
@@ -146,7 +151,7 @@ class Equilibrium:
         """(n,) the pull on resting vertices beyond what their walls can take, force."""
         if not self.part.resting.any():
             return np.zeros(len(self.X))
-        return excess_pull(self.shape, self.part.walls, self.part.resting, -self.gradient_with_reactions)
+        return excess_pull(self.part_here, -self.gradient_with_reactions)
 
     @cached_property
     def jacobian(self) -> Callable[[Floats], Floats]:

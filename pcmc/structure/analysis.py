@@ -44,6 +44,7 @@ TRIES = 4
 COLUMNS = ["case", "share", "taut", "down", "up", "moved", *"xyz", "least_force", "largest_force"]
 COLUMNS += ["least_x", "least_y", "least_z", "slack_area", "slack_share", *FORCE, "pressure", "volume"]
 MESH = "beyond the first slack part a share depends on the mesh; the share before that hardly does"
+UNCLEAR = ": a roof wrinkles before it gives way, so this may be the program's convergence, not the roof"
 OnCase = Callable[[str], object]  # called with a few words before each case
 
 
@@ -210,7 +211,8 @@ class Analysis:
             state += f" around {point_text(at, surface.size)} of {patch!r}"
             share = f"{100.0 * case.share:.0f} % of its loads" if case.share else "not its self-weight"
             if not case.carried:
-                lines.append(f"{case.name}: {share} carried, then it gives way; {state}")
+                ended = "it gives way" if slack else "CalculiX finds no equilibrium"
+                lines.append(f"{case.name}: {share} carried, then {ended}; {state}{UNCLEAR * (not slack)}")
             elif slack:
                 lines.append(f"{case.name}: carried, but {state}: there it wrinkles")
             if (depth := self.sunk(case)) > 0.0:

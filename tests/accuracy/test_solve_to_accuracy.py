@@ -416,4 +416,7 @@ def test_a_patch_without_a_name_of_its_own_is_not_confused():
     )
     with refused(OptionError, what="patch", found="b"):
         adaptive.check_places({"area of b": 1.0}, pair)
+    with refused(OptionError, what="patch", found="b"):
+        adaptive.check_places({"reaction of a | b": 1.0}, pair)
     adaptive.check_places({"area of near": 1.0, "reaction of a near (1, 2, 3)": 1.0}, pair)
+    adaptive.check_places({"reaction of a | near": 1.0, "reaction of a, inside near (1, 2)": 1.0}, pair)

@@ -140,7 +140,7 @@ def test_the_sentence_of_balance_tells_whether_there_are_loads():
     assert balance_sentence(table) == told
 
 
-def test_what_rounding_leaves_of_a_balance_is_said_in_words():
+def test_what_rounding_leaves_of_a_balance_is_0():
     x, y = np.indices((4, 4)).reshape(2, 16)
     a = np.flatnonzero((x < 3) & (y < 3))
     F = np.concatenate([np.stack([a, a + 4, a + 5], axis=1), np.stack([a, a + 5, a + 1], axis=1)])
@@ -148,7 +148,7 @@ def test_what_rounding_leaves_of_a_balance_is_said_in_words():
                         fixed=(x % 3 == 0) | (y % 3 == 0))  # fmt: skip
     table = pcmc.certify(flat).balance
     assert table[["force_share", "moment_share"]].iloc[-1].tolist() == [0.0, 0.0]
-    assert "cancel to rounding in x, y and z, and to rounding in moments" in balance_sentence(table)
+    assert "cancel to 0 of them in x, y and z, and to 0 in moments" in balance_sentence(table)
 
 
 def test_the_sentence_of_balance_names_the_place_of_moments_without_signs_of_zero():

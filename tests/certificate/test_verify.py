@@ -166,7 +166,7 @@ def test_a_junction_about_to_lift_is_refused():
     surface = solve(generators.two_squares(4, alpha_aux=3.0)).surface
     assert verify(surface).proved
     part = standing_part(surface)
-    pull, capacity = pull_and_capacity(part.surface, part.walls, part.resting)
+    pull, capacity = pull_and_capacity(part)
     share = float((np.abs(pull) / np.maximum(capacity, 1e-300)).max())
     on_the_verge = surface.retensioned({"wall": 3.0 * share * (1.0 + 1e-12)})
     assert "verge" in verify(on_the_verge).reason

@@ -13,7 +13,7 @@ from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.cli import main
 from pcmc.drawings import drawing_set, dxf
-from pcmc.drawings.sheet import MEMBERS, SheetLine, box, column
+from pcmc.drawings.sheet import MEMBERS, SheetLine, Text, box, column, place_labels
 from pcmc.drawings.views import model_curves, plan_view
 from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import Plan
@@ -196,3 +196,17 @@ def test_the_name_of_a_line_stands_at_its_middle():
     stay = SheetLine(np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]]), MEMBERS, name="stay")
     view = plan_view(roof, [*model_curves(roof), stay], [])
     assert [(at.tolist(), name) for at, name, _ in view.texts] == [([2.0, 0.0], "stay")]
+
+
+def test_labels_keep_off_lines_where_there_is_room():
+    slanted = SheetLine(np.array([[-40.0, -30.0], [40.0, 30.0]]), "PCMC-RIDGE")
+    labels = [Text(at * slanted.points[1] + [0.5, 1.0], f"P{k}") for k, at in enumerate((-0.5, 0.0, 0.5))]
+    across = np.array([0.6, -0.8])  # at right angles to the line, which goes through 0
+    for lines in ([], [slanted]):
+        placed = place_labels(labels, [], lines, rings=2)
+        (x0, y0), (x1, y1) = np.moveaxis([box(label) for label in placed], 0, -1)
+        sides = np.sign([np.array(corner).T @ across for corner in ((x0, y0), (x0, y1), (x1, y0), (x1, y1))])
+        assert (sides != sides[0]).any() == (not lines)
+    field = [SheetLine(np.array([[-40.0, y], [40.0, y]]), "PCMC-RIDGE") for y in np.arange(-30.0, 30.0)]
+    full, free = (np.array([label.at for label in place_labels(labels, [], some)]) for some in (field, []))
+    np.testing.assert_array_equal(full, free)  # without room as without lines

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from nightly import at_night
 from shapes import placed, rotation, shaken
-from starts import double_bubble, four_fans, two_caps, two_squares
+from starts import double_bubble, four_fans, two_caps, two_squares, uneven
 
 from pcmc import Patch, Surface, Verdict, certify, energy, solve
 from pcmc.forces.motion_space import motion_space, vertex_classes
@@ -30,9 +30,9 @@ def crest_of(surface, walls):
     return free[np.argsort(surface.vertices[free, 1])]
 
 
-def pressed(n=6, count=2, **arguments):
+def pressed(n=6, count=2, drop=0.0, **arguments):
     """Two squares whose junction rests on Π at the first ``count`` vertices from one corner."""
-    surface = two_squares(n, **arguments)
+    surface = uneven(two_squares(n, **arguments), drop)
     walls = find_walls(surface)
     resting = np.zeros(surface.n, dtype=bool)
     resting[crest_of(surface, walls)[:count]] = True
@@ -173,12 +173,11 @@ def test_pinching_turns_with_the_plane():
     there = find_walls(turned)
     turned = turned.moved(place(full.vertices))
     np.testing.assert_array_equal(resting_vertices(turned, there), resting)
-    other = StandingPart.of(turned, there, resting).surface
+    parts = StandingPart.of(full, walls, resting), StandingPart.of(turned, there, resting)
+    other = parts[1].surface
     np.testing.assert_array_equal(other.faces, standing.faces)
     np.testing.assert_allclose(other.vertices, place(standing.vertices), atol=1e-12)
-    for one, two in zip(
-        pull_and_capacity(standing, walls, resting), pull_and_capacity(other, there, resting), strict=True
-    ):
+    for one, two in zip(*map(pull_and_capacity, parts), strict=True):
         np.testing.assert_allclose(one, two, atol=1e-12)
 
 
@@ -213,11 +212,12 @@ def test_curves_and_neighbours_of_the_resting_part():
     assert np.isinf(spacing[np.setdiff1d(np.arange(full.n), walls.top_edges)]).all()
 
 
+@pytest.mark.parametrize("drop", [0.0, 0.3])
 @pytest.mark.parametrize("count", [1, 3, 5])
-def test_pull_less_capacity_is_what_lifting_gains(count):
+def test_pull_less_capacity_is_what_lifting_gains(count, drop):
     """(E(lifted by z) - E(resting)) / z tends to capacity - pull."""
-    full, walls, resting, standing = pressed(count=count)
-    pull, capacity = pull_and_capacity(standing, walls, resting)
+    full, walls, resting, _ = pressed(count=count, drop=drop)
+    pull, capacity = pull_and_capacity(StandingPart.of(full, walls, resting))
     assert (capacity[~resting] == 0).all()
     assert (pull[~resting] == 0).all()
     spacing = top_spacing(full, walls)
@@ -274,7 +274,7 @@ def complementary(surface):
     """Whether the pull on each resting vertex is one that its wall can take."""
     walls = find_walls(surface)
     resting = resting_vertices(surface, walls)
-    pull, capacity = pull_and_capacity(StandingPart.of(surface, walls, resting).surface, walls, resting)
+    pull, capacity = pull_and_capacity(StandingPart.of(surface, walls, resting))
     return resting, pull, capacity
 
 

@@ -1,12 +1,13 @@
 """Walls with held bottoms that pinch: a junction that comes down rests on the curve of its bottom."""
 
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from nightly import at_night
 from shapes import placed, rotation
-from starts import four_fans, stationary, two_squares
+from starts import four_fans, stationary, two_squares, uneven
 
 import pcmc
 from pcmc import Patch, Surface, Verdict, certify, energy, solve
@@ -21,7 +22,7 @@ from pcmc.forces.pinching import (
     standing_part,
     top_spacing,
 )
-from pcmc.forces.wall_rows import find_walls
+from pcmc.forces.wall_rows import _held_feet, find_walls
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Divider, Plan
@@ -42,12 +43,15 @@ def contact(surface):
     """Which vertices rest, their pull, and what their wall can take."""
     walls = find_walls(surface)
     resting = resting_vertices(surface, walls)
-    return resting, *pull_and_capacity(StandingPart.of(surface, walls, resting).surface, walls, resting)
+    return resting, *pull_and_capacity(StandingPart.of(surface, walls, resting))
 
 
-def pressed(n=6, count=2, right=2.0):
-    """Example 1, its junction pressed onto the held bottom at the first ``count`` vertices from one end."""
-    surface = example(n, 3.0, right)
+def pressed(n=6, count=2, right=2.0, drop=0.0):
+    """Example 1, its junction pressed onto the held bottom at the first ``count`` vertices from one end.
+
+    The pressure right of the wall is less by ``drop``.
+    """
+    surface = uneven(example(n, 3.0, right), drop)
     walls = find_walls(surface, held=True)
     free = np.flatnonzero(walls.top_free)
     resting = np.zeros(surface.n, dtype=bool)
@@ -132,12 +136,14 @@ def test_what_is_left_when_a_junction_rests_on_a_held_bottom(count):
     np.testing.assert_array_equal(again.vertices, standing.vertices)
 
 
+@pytest.mark.parametrize("drop", [0.0, 0.3])
 @pytest.mark.parametrize("count", [1, 3, 5])
-def test_pull_less_capacity_is_what_a_lift_to_any_side_gains(count):
+def test_pull_less_capacity_is_what_a_lift_to_any_side_gains(count, drop):
     """(E(lifted by t u) - E) / t tends to capacity - f·u, least along f; u across the bottom."""
-    full, walls, resting, standing = pressed(count=count, right=3.0)
-    pull, capacity = pull_and_capacity(standing, walls, resting)
-    along_pull = directions_of_pull(standing, walls, resting)
+    full, walls, resting, standing = pressed(count=count, right=3.0, drop=drop)
+    part = StandingPart.of(full, walls, resting)
+    pull, capacity = pull_and_capacity(part)
+    along_pull = directions_of_pull(part)
     assert np.abs(along_pull[resting, 0]).min() > 0.05  # it pulls sideways, too
     step, spacing = 1e-6, 4 / 6
     for v in np.flatnonzero(resting):
@@ -161,10 +167,10 @@ def test_where_walls_meet_no_lift_gains_more_than_that_along_the_pull():
     walls = find_walls(start, held=True)
     assert walls.pinchable.sum() == 4
     resting = walls.top_free
-    standing = StandingPart.of(start, walls, resting).surface
-    full = start.moved(StandingPart.of(start, walls, resting).whole_positions(standing.vertices))
-    force = -energy_and_gradient(standing, supports=False)[1]
-    pull, capacity = pull_and_capacity(standing, walls, resting, force)
+    part = StandingPart.of(start, walls, resting)
+    full = part.whole_at(part.surface.vertices)
+    force = -energy_and_gradient(part.surface, supports=False)[1]
+    pull, capacity = pull_and_capacity(part, force)
     middle = np.bincount(walls.top_edges.ravel(), minlength=full.n) == 4
     v = int(np.flatnonzero(middle)[0])
     step, random = 1e-6 / float(top_spacing(full, walls)[v]), np.random.default_rng(0)
@@ -174,7 +180,7 @@ def test_where_walls_meet_no_lift_gains_more_than_that_along_the_pull():
         slope = (energy(lift(full, walls, middle, step, ways)) - energy(full)) / 1e-6
         return force[v] @ ways[v] / (slope + force[v] @ ways[v])
 
-    best = pull_directions(standing, walls, resting, force)[v]
+    best = pull_directions(part, force)[v]
     assert share(best) == pytest.approx(pull[v] / capacity[v], rel=1e-4)
     assert np.linalg.norm(np.cross(best, force[v])) > 1e-3 * np.linalg.norm(force[v])  # not along the pull
     assert max(share(u) for u in random.standard_normal((200, 3))) < (1.0 + 1e-4) * pull[v] / capacity[v]
@@ -203,6 +209,16 @@ def test_a_strong_wall_between_two_others_comes_down_too():
     assert result.energy == pytest.approx(2.0 * sum(bays), rel=5e-4)
 
 
+def test_a_wall_whose_bottom_has_a_gap_has_no_feet():
+    """As many vertices above as below do not pair them: a bottom in two pieces has four ends, the top two."""
+    rows = np.array([[[x, 0.0, z] for x in range(5)] for z in (1.0, 0.0)]).reshape(-1, 3)
+    wall = SimpleNamespace(n=10, on_planes=(), vertices=rows)
+    top, bottom = np.array([[0, 1], [1, 2], [2, 3], [3, 4]]), np.array([[5, 6], [7, 8], [8, 9]])
+    assert _held_feet(wall, top, top + 5).tolist() == [5, 6, 7, 8, 9, *[-1] * 5]
+    assert _held_feet(wall, top, bottom) is None
+    assert _held_feet(wall, bottom, top) is None
+
+
 def test_a_strong_wall_comes_down_on_a_sloped_bottom(tmp_path):
     """Of a tilted plan: a roof in each bay, on finer meshes, too, proved, and read again from a file."""
     about = {"edge_length": 0.8, "tension": 2.0, "pressure": 0.4}
@@ -215,7 +231,7 @@ def test_a_strong_wall_comes_down_on_a_sloped_bottom(tmp_path):
     assert roof.certificate.verdict is Verdict.STABLE
     part = standing_part(roof.surface)
     np.testing.assert_array_equal(part.resting, part.walls.top_free)
-    pull, capacity = pull_and_capacity(part.surface, part.walls, part.resting)
+    pull, capacity = pull_and_capacity(part)
     count = part.resting.sum()
     assert capacity.sum() == pytest.approx(2.5 * np.hypot(8.0, 0.8) * count / (count + 1), rel=1e-12)
     assert (np.abs(pull) <= capacity).all()
@@ -235,10 +251,10 @@ def test_a_wall_that_stands_on_one_vertex_pulls_up_none_of_those_beside_it():
     full = pcmc.solve(roof.surface())
     assert full.certificate.verdict is Verdict.STABLE  # before, they were lifted and put down in turn
     part, full = standing_part(full.surface), full.surface
-    standing, walls, resting = part.surface, part.walls, part.resting
-    pull, capacity = pull_and_capacity(standing, walls, resting)
-    ways = directions_of_pull(standing, walls, resting)
-    beside = np.unique(standing.faces[spans(standing, walls, resting)])
+    walls, resting = part.walls, part.resting
+    pull, capacity = pull_and_capacity(part)
+    ways = directions_of_pull(part)
+    beside = np.unique(part.surface.faces[spans(part)])
     beside = beside[resting[beside]]
     assert len(beside) >= 2
     for v in beside:
@@ -259,9 +275,9 @@ def test_walls_that_end_at_another_rest_together(line):
     np.testing.assert_array_equal(part.resting, part.walls.top_free)
 
 
-def directions_of_pull(standing, walls, resting):
+def directions_of_pull(part):
     """As the sheets pull."""
-    return pull_directions(standing, walls, resting, -energy_and_gradient(standing, supports=False)[1])
+    return pull_directions(part, -energy_and_gradient(part.surface, supports=False)[1])
 
 
 def test_a_move_past_the_bottom_comes_down_on_it():
@@ -325,7 +341,7 @@ def test_a_sideways_pull_takes_the_junction_off():
     assert low.certificate.verdict is Verdict.STABLE
     resting, walls = contact(low.surface)[0], find_walls(low.surface)
     assert resting.sum() == 7
-    direction = directions_of_pull(StandingPart.of(low.surface, walls, resting).surface, walls, resting)
+    direction = directions_of_pull(StandingPart.of(low.surface, walls, resting))
     assert (direction[resting, 0] > 0.2).all()  # towards the stronger patch
     weak = solve(low.surface.retensioned({"wall": 1.2}))
     assert weak.certificate.verdict is Verdict.STABLE

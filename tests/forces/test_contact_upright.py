@@ -37,10 +37,10 @@ def test_the_plane_of_an_upright_wall_takes_the_pull_across_it():
     assert found.certificate.verdict is Verdict.STABLE
     part = standing_part(found.surface)
     assert 0 < part.resting.sum() < 9
-    pull, capacity = pull_and_capacity(part.surface, part.walls, part.resting)
+    pull, capacity = pull_and_capacity(part)
     assert (np.abs(pull) <= capacity)[part.resting].all()
     force = -energy_and_gradient(part.surface, supports=False)[1]
-    direction = pull_directions(part.surface, part.walls, part.resting, force)[part.resting]
+    direction = pull_directions(part, force)[part.resting]
     assert np.allclose(direction, [0.0, 0.0, 1.0])
     assert (np.linalg.norm(force[part.resting], axis=1) > capacity[part.resting]).all()
     supports = found.certificate.supports.set_index("kind")

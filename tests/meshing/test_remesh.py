@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from refusals import refused
 from scipy.spatial import cKDTree
+from support_cases import lens
 
 import generators
 from pcmc import Patch, Surface, solve
@@ -259,3 +260,10 @@ def test_a_single_triangle():
     fine = remesh(one, 0.25)
     assert patch_areas(fine)[0] == pytest.approx(2.0)
     assert minimum_angle(fine) > 20.0
+
+
+def test_new_triangles_keep_the_side_that_a_pressure_pushes_to():
+    """MMG turns sheets so that neighbours run alike; the lower foil of this lens does not, and has p < 0."""
+    finer = remesh(solve(lens()).surface, 0.2)
+    roof = solve(finer).surface
+    assert roof.vertices[:, 2].min() == pytest.approx(-roof.vertices[:, 2].max(), rel=0.02)

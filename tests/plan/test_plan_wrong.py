@@ -251,3 +251,11 @@ def test_a_curve_beside_the_keys_of_its_divider():
     with pytest.raises(OptionError, match=r"divider 1: beside 'name' its curve is a key, too: curve = {poly"):
         Plan(BOX, [divider], tension=5.0, edge_length=2.0).surface()
     assert Plan(BOX, [{"curve": {"polyline": WALL}, "name": "mid"}], tension=5.0, edge_length=2.0).surface().m
+
+
+def test_a_wall_with_a_held_bottom_on_an_edge_that_slides():
+    """It was "curves: curve 0 has the vertex 4, which is not fixed"."""
+    with pytest.raises(
+        PlanError, match=r"divider 'wall 1' ends on an edge that slides; give it bottom = .sliding., or"
+    ):
+        Plan(BOX, [{"curve": WALL, "wall": 1.0}], tension=5.0, edge_length=2.0, edge="sliding").surface()

@@ -142,6 +142,17 @@ def test_what_is_too_much_is_answered():
 
 
 @needs_ccx
+def test_where_nothing_is_slack_a_roof_is_not_said_to_give_way():
+    found = analyse(model_of(square(8), loads=[Snow(1e-4, patches=["film"])], anyway=True))
+    rest, snow = found.cases
+    [told] = replace(found, cases=(rest, replace(snow, share=0.14)), remedy=0.0).answers()[:1]
+    assert told.startswith(
+        "snow: 14 % of its loads carried, then CalculiX finds no equilibrium; nothing is slack"
+    )
+    assert told.endswith("so this may be the program's convergence, not the roof")
+
+
+@needs_ccx
 def test_combinations_add_loads_with_their_factors():
     """On a film that answers in proportion the deflections add up, self-weight with its own factor."""
     loads = [SelfWeight(), Snow(1e-4, patches=["film"]), Wind({"film": 2e-4})]

@@ -86,7 +86,7 @@ def test_junction_that_rests_on_the_plane_is_lifted_when_its_wall_pulls_less():
 def test_junction_stands_off_as_soon_as_its_wall_pulls_less_than_the_sheets():
     start = solve(two_squares(6, alpha_aux=3.0), target="stationary").surface
     found = standing_part(start)
-    pull, capacity = pull_and_capacity(found.surface, found.walls, found.resting)
+    pull, capacity = pull_and_capacity(found)
     least = 3.0 * float((pull[found.resting] / capacity[found.resting]).max())
     for part, resting in ((1.001, 5), (0.995, 3)):
         branch = follow(start, "wall", part * least)
