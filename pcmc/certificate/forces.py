@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats, Ints, kept_with_owner, read_only
+from ..base.arrays import Bools, Floats, Ints, kept_with_owner, mask_of, read_only
 from ..base.tolerances import FORCE_ROUNDING
 from ..forces import cables
 from ..forces.cables import directions, pull_along
@@ -260,7 +260,7 @@ class SheetSides(NamedTuple):
         edge = row[topo.edge_of_face]
         face, corner = np.nonzero(edge >= 0)
         own = (corner[:, None] + np.arange(3)) % 3
-        beyond = _far_corners(surface)[face[:, None], own[:, 1:]]
+        beyond = _far_corners(surface, 3 * face[:, None] + own[:, 1:])
         corners = np.column_stack([F[face[:, None], own], beyond])
         return cls(edge[face, corner], surface.patch_of_face[face], corners, surface.plane)
 
@@ -298,18 +298,19 @@ class SheetSides(NamedTuple):
         return tension[:, None] * _unit(n - slope * normal)[0]
 
 
-@kept_with_owner
-def _far_corners(surface: Surface) -> Ints:
-    """(m,3) the corner beyond the side opposite each corner, of the next triangle of the same sheet; that
-    corner itself where there is none, or only an image of it."""
+def _far_corners(surface: Surface, corners: Ints) -> Ints:
+    """(s,2) beyond the sides opposite some corners, by their numbers 3 face + corner (s,2): the corner of the
+    next triangle of the same sheet; that corner itself where there is none, or only an image of it."""
     topo, F = surface.topology, surface.faces
-    ended, pairs = topo.curve_edge | surface.edges_on_curves.drawn, topo.neighbours
+    ended, near = topo.curve_edge | surface.edges_on_curves.drawn, mask_of(corners, F.size)
+    pairs = topo.neighbours
+    pairs = pairs[near[pairs[:, 0]] | near[pairs[:, 1]]]
     pairs = pairs[~ended[topo.edge_of_face.ravel()[pairs[:, 0]]]]
     ends = np.sort(F[pairs[:, :, None] // 3, (pairs[:, :, None] % 3 + [1, 2]) % 3])
     pairs = pairs[(ends[:, 0] == ends[:, 1]).all(axis=1)]
     far = np.arange(F.size)
     far[pairs] = pairs[:, ::-1]
-    return read_only(F.ravel()[far].reshape(F.shape))
+    return F.ravel()[far[corners]]
 
 
 def _dot(u: Any, v: Any) -> Any:
