@@ -235,10 +235,8 @@ def folded_over(surface: Surface, pinchable: Bools) -> str:
     face = one[back.argmax()]
     name = surface.patches[surface.patch_of_face[face]].name
     place = point_text(surface.vertices[surface.faces[face]].mean(axis=0), surface.size)
-    text = (
-        f"patch {name!r} is folded near {place}: a triangle lies on the back of another, so its area counts"
-    )
-    return f"{text} more than once; move the vertices there apart, or remesh"
+    text = f"patch {name!r} is folded near {place}: a triangle lies on the back of another, and the area"
+    return f"{text} there counts twice; move the vertices there apart, or remesh"
 
 
 def _slips(surface: Surface, pinchable: Bools, place: Floats, reach: float) -> bool:

@@ -33,7 +33,7 @@ from ..surface.supports import apply_supports, symmetric_part
 from ..surface.topology import EdgeCurve
 
 DAMPED = 1e-4  # of 1: bends that the next triangles do not tell stay small
-NARROW = 0.02  # of a triangle and the next ones: no bend is told by one with a side or height below it
+NARROW = 0.02  # of the size of a triangle and the next ones: a lower one keeps its own co-normal
 
 CableEnd = tuple[Cable, int, Floats]
 
@@ -242,7 +242,7 @@ class SheetSides(NamedTuple):
 
     through a, b and c, and as nearly as it can through the far corners d and e of the next triangles of the
     sheet. Its co-normal at the side is that of the triangle turned by the slope g: for a smooth sheet at rest
-    its error is O(h²), that of the triangle's own O(h).
+    its error is O(h²), that of the triangle's own O(h). A triangle that is nearly flattened keeps its own.
     """
 
     edge: Ints  # (s,) which of the edges

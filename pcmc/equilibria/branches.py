@@ -63,13 +63,13 @@ class TracedParameter:
         except NoBranch as error:
             return str(error)
 
-    def early_end(self, branch: Branch) -> str:
-        """Where and why a branch ends within the span; "" if it leads out of it."""
+    def early_end(self, branch: Branch) -> tuple[float, str] | None:
+        """Where and why a branch ends within the span; None if it leads out of it."""
         value = float(branch.points.parameter.iloc[-1])
         if not self.span[0] <= value <= self.span[1]:
-            return ""
+            return None
         why = {Ending.STEPS: f"after {STEPS} steps", Ending.LOST: f"as {branch.detail}"}
-        return f"ended at {self.name} {value:.4g} {why.get(branch.ending, 'as triangles collapse')}"
+        return value, why.get(branch.ending, "as triangles collapse")
 
     def _half(self, surface: Surface, sign: float, watch: Callable[[Progress], None]) -> Branch:
         """One way; again in short steps where contact and index change on one, which hides a bifurcation."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -25,10 +24,7 @@ INCOMPLETE = (
     " reaches, and no start comes near, is missed. A barrier is the lowest of the saddles found, so an upper"
     " bound; a lower pass cannot be excluded."
 )
-
-
 LOST = "leads to no known end"  # how a way down ends that the solver gave up
-NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +180,7 @@ class Equilibria:
             half = f"All this is of a part of the roof; shapes that are not symmetric in {half} were left out"
             half += " (--whole, or the surface that pcmc.mirrored unfolds, has them)."
         given = "The search was stopped before its end." if self.stopped else ""
-        words = [*self.barrier_lines(units), *self.searched, *_grouped(self.failed), given, half, INCOMPLETE]
+        words = [*self.barrier_lines(units), *self.searched, *self.failed, given, half, INCOMPLETE]
         return "\n".join(line for line in (units.sentence if units else "", rows, *words) if line)
 
     def barrier_lines(self, units: Units = NO_UNITS) -> list[str]:
@@ -205,23 +201,3 @@ class Equilibria:
 
     def __repr__(self) -> str:
         return self.text()
-
-
-def _grouped(sentences: Sequence[str]) -> list[str]:
-    """The sentences, those about a branch that differ in one number as a single one.
-
-    >>> _grouped(["A branch ended at 0.9; try it.", "A branch passes 1.", "A branch ended at 1.2; try it."])
-    ['2 branches ended at 0.9, 1.2; try it.', 'A branch passes 1.']
-    """
-    groups: dict[tuple[str, ...], list[str]] = {}
-    for sentence in sentences:
-        groups.setdefault(tuple(NUMBER.split(sentence)), []).append(sentence)
-    lines = list[str]()
-    for words, alike in groups.items():
-        columns = [list(dict.fromkeys(column)) for column in zip(*map(NUMBER.findall, alike), strict=True)]
-        if words[0].startswith("A branch ") and sum(len(column) > 1 for column in columns) == 1:
-            numbers = [", ".join(column) for column in columns]
-            text = "".join(word for pair in zip(words, [*numbers, ""], strict=True) for word in pair)
-            alike = [text.replace("A branch", f"{len(alike)} branches").replace(" on it is ", " on them is ")]
-        lines += alike
-    return lines

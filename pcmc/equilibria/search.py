@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -168,6 +168,7 @@ class _Search:
         self.left: dict[str, list[tuple[float, Shape]]] = {line.name: [] for line in lines}  # at bifurcations
         self.tried: set[tuple[int, int]] = set()  # pairs of minima
         self.failed: list[str] = []
+        self.early_ends: dict[tuple[str, str], list[float]] = {}  # by parameter and reason
         self.starts = self.arrived = 0
         self.stopped = False
 
@@ -244,7 +245,7 @@ class _Search:
         if isinstance(halves, str):
             self.failed.append(f"No branch in {line.name} starts at the equilibrium {how}: {halves}.")
             return
-        self.tell_early_ends(line, halves)
+        self.keep_early_ends(line, halves)
         level, how, led_to = [join_branches(*halves)], f"on a branch in {line.name}", {number}
         for depth in range(self.options.depth + 1):
             following = list[Branch]()
@@ -254,12 +255,20 @@ class _Search:
                     self.cross(line, there, beside, how, led_to)
                 if depth < self.options.depth:
                     following += self.leaving(line, branch, watch)
-            self.tell_early_ends(line, following)
+            self.keep_early_ends(line, following)
             level, how = following, f"on a branch in {line.name}, beyond a bifurcation"
 
-    def tell_early_ends(self, line: TracedParameter, branches: Iterable[Branch]) -> None:
-        for end in filter(None, map(line.early_end, branches)):
-            self.failed.append(f"A branch {end}; what lies beyond on it is not known. Try a finer mesh.")
+    def keep_early_ends(self, line: TracedParameter, branches: Iterable[Branch]) -> None:
+        for value, why in filter(None, map(line.early_end, branches)):
+            self.early_ends.setdefault((line.name, why), []).append(value)
+
+    def told_early_ends(self) -> Iterator[str]:
+        """A sentence for all branches of a parameter that ended for one reason."""
+        for (name, why), values in self.early_ends.items():
+            who, it = ("A branch", "it") if len(values) == 1 else (f"{len(values)} branches", "them")
+            where = ", ".join(dict.fromkeys(f"{value:.4g}" for value in values))
+            beyond = f"what lies beyond on {it} is not known. Try a finer mesh."
+            yield f"{who} ended at {name} {where} {why}; {beyond}"
 
     def cross(
         self, line: TracedParameter, there: Surface | str, beside: str, how: str, led_to: set[int]
@@ -366,6 +375,6 @@ class _Search:
             lines=tuple(self.lines),
             branches={line.name: tuple(branches) for line, branches in every},
             searched=tuple(searched),
-            failed=tuple(dict.fromkeys(self.failed)),
+            failed=(*dict.fromkeys(self.failed), *self.told_early_ends()),
             stopped=self.stopped,
         )

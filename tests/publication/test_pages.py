@@ -6,7 +6,6 @@ import ast
 import importlib
 import inspect
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +13,7 @@ from pathlib import Path
 import pytest
 from nightly import night_but
 from pages import parts, run_page
+from programs import expect_ccx
 
 import pcmc
 from pcmc.project import reference
@@ -29,8 +29,8 @@ SCRIPTS = sorted(path.stem for path in (DOCS / "pictures").glob("*.py") if path.
 @pytest.mark.parametrize("page", night_but(RUN))
 @pytest.mark.filterwarnings("ignore")
 def test_a_page_runs(page, tmp_path, monkeypatch):
-    if page.endswith(("under-load.md", "members.md")) and shutil.which("ccx") is None:
-        pytest.skip("CalculiX is not installed")
+    if page.endswith(("under-load.md", "members.md")):
+        expect_ccx()
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PCMC_CACHE", str(tmp_path / "cache"))
     assert run_page(HOME / page) > 0
@@ -62,8 +62,8 @@ def test_a_picture_is_beside_its_script_and_light(name):
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", [name for name in SCRIPTS if name not in ("page", "report", "drawings")])
 def test_a_script_draws_its_picture_again(name, tmp_path):
-    if name in ("load_case", "members", "under_load", "slack") and shutil.which("ccx") is None:
-        pytest.skip("CalculiX is not installed")
+    if name in ("load_case", "members", "under_load", "slack"):
+        expect_ccx()
     subprocess.run([sys.executable, DOCS / "pictures" / f"{name}.py"], cwd=tmp_path, check=True)
     assert (tmp_path / f"{name}.png").stat().st_size > 1000
     table = DOCS / "pictures" / f"{name}.csv"

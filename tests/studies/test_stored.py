@@ -114,7 +114,7 @@ def test_the_code_of_a_commit_is_compared_by_the_rules_of_today(tmp_path):
     """The provenance's own hashes stand in where git does not know the commit, or there were changes."""
     commit = git("rev-parse", "HEAD")
     if not commit:
-        pytest.skip("no git here")
+        pytest.skip("not a checkout of git: there is no commit whose code could be compared")
     module = EQUILIBRIA.data.__module__
     found = code_at(commit, [module, "studies.gone"])
     assert found["studies.gone"] == {}

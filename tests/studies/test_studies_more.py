@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from nightly import at_night
+from programs import needs_evolver
 from tables import last_row
 
 from generators import four_fans, spherical_cap, two_squares
@@ -25,7 +26,7 @@ from studies.examples.flow import NOISE
 from studies.folder import Folder
 from studies.orders import limit_order, slope
 from studies.questions import accuracy, bench, curved, refinement, solvers, stability
-from studies.reference import evolver, kratos
+from studies.reference import kratos
 from studies.registry import STUDIES, chosen, of_the_paper
 from studies.study import perform
 
@@ -317,10 +318,10 @@ def test_every_ladder_of_stored_bars_has_several_meshes():
 # --------------------------------------------------------------------------------------- bench
 
 
-@pytest.mark.parametrize("program", ["pcmc", "Surface Evolver", "NLopt L-BFGS", "scipy L-BFGS"])
+@pytest.mark.parametrize(
+    "program", ["pcmc", pytest.param("Surface Evolver", marks=needs_evolver), "NLopt L-BFGS", "scipy L-BFGS"]
+)
 def test_each_program_of_the_bench_brings_a_cap_to_rest_and_is_heard_where_there_is_none(program):
-    if program == "Surface Evolver" and not evolver.available():
-        pytest.skip("evolver is not installed")
     run = bench.PROGRAMS[program]
     end = run(spherical_cap(0.3, alpha=0.6))
     assert energy(end.surface) == pytest.approx(bench.CASES["cap"].exact, rel=0.01)

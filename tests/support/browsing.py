@@ -15,7 +15,8 @@ import pytest
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")
 needs_browser = pytest.mark.skipif(
-    not (BROWSER and DRIVER), reason="chromium or chromedriver is not installed"
+    not (BROWSER and DRIVER),
+    reason="chromium or chromedriver is not installed (Debian: apt install chromium chromium-driver)",
 )
 
 FLAGS = (

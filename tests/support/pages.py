@@ -84,7 +84,7 @@ def understood(words: list[str]) -> None:
 
     from pcmc.cli.app import app
 
-    typer.main.get_command(app).commands["explore"].make_context("explore", words)  # type: ignore[attr-defined]
+    typer.main.get_command(app).commands["explore"].make_context("explore", words)
 
 
 def run_project(text: str, file: str, where: str) -> None:
