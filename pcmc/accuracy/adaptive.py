@@ -213,10 +213,13 @@ def accuracies(given: Any) -> dict[str, float]:
 
 def check_places(wanted: Mapping[str, float], surface: Surface) -> None:
     """Refuse a quantity of a patch that the surface does not have, or of a line between such patches."""
+    patches = {patch.name for patch in surface.patches}
     for name in wanted:
         _, of, place = name.partition(" of ")
-        for patch in place.partition(" near ")[0].removesuffix(", inside").split(" | ") if of else ():
-            surface.patch_index(patch)
+        line = place.partition(" near ")[0].removesuffix(", inside")
+        if of and line not in patches:
+            for patch in line.split(" | "):
+                surface.patch_index(patch)
 
 
 def goals_in(table: pd.DataFrame, wanted: Mapping[str, float]) -> dict[Goal, float]:

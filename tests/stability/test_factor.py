@@ -19,9 +19,7 @@ from pcmc.stability import factorisation as factor
 from pcmc.stability.factorisation import SingularMatrix, factoriser, installed
 
 BACKENDS = [
-    pytest.param(
-        name, marks=pytest.mark.skipif(name not in installed(), reason=f"{name}: [fast] installs it")
-    )
+    pytest.param(name, marks=pytest.mark.skipif(name not in installed(), reason=f"[fast] installs {name}"))
     for name in factor.BACKENDS
 ]
 every_backend = pytest.mark.parametrize("backend", BACKENDS)
