@@ -12,4 +12,4 @@ plan = Plan(
 )
 roof = pcmc.solve(plan.surface()).surface
 error = 100 * pcmc.curvature_error(roof, method="cotangent")
-draw(roof, "error.png", scalars=error, label="error of the cotangent curvature, %", edges=False, width=600)
+draw(roof, "error.png", scalars=error, label="error of Meyer's mean curvature, %", edges=False, width=600)
