@@ -176,6 +176,23 @@ def test_a_two_hinged_half_circle_has_the_thrust_of_its_closed_form():
     assert np.polyfit(np.log([16, 32, 64]), np.log(off), 1)[0] == pytest.approx(-4.0, abs=0.1)
 
 
+def test_a_curved_cantilever_has_the_moments_and_shear_of_its_closed_form_with_order_two():
+    """A quarter circle under an even load q per length, of bars of two lengths, clamped at one end: b from
+    its free end, V = q R b, M = q R² (1 - cos b), T = q R² (b - sin b)."""
+    off = []
+    for n in (16, 32, 64):
+        angle = np.linspace(0.0, np.pi / 2.0, n + 1)
+        angle[1:-1:2] += 0.25 * (angle[1] - angle[0])
+        X = 4.0 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+        forces = -3.0 * lumped(4.0 * np.diff(angle))[:, None] * UP
+        within = frame_along(X, [(0, k) for k in range(6)]).solved(forces).within(np.arange(n))
+        b = np.pi / 2.0 - angle
+        exact = np.stack([12.0 * b, -48.0 * (b - np.sin(b)), -48.0 * (1.0 - np.cos(b))], axis=1)
+        off.append(np.abs(within[:, [1, 3, 4]] - exact).max(axis=0) / np.abs(exact).max(axis=0))
+    assert (off[-1] < 0.003).all()
+    assert (np.polyfit(np.log([16, 32, 64]), np.log(off), 1)[0] < -1.9).all()
+
+
 def test_a_ring_that_nothing_holds_carries_its_pull_without_bending():
     """N = q R with the second order of its sides; what is out of balance is left out."""
     off = []
