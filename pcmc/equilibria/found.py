@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -62,6 +62,11 @@ class WayDown:
     saddle: int
     to: int | None
     end: str = ""
+
+
+def pairs(ways: Sequence[WayDown]) -> Iterator[tuple[WayDown, WayDown]]:
+    """The two ways down from each saddle, which follow each other."""
+    return zip(ways[::2], ways[1::2], strict=True)
 
 
 @dataclass(frozen=True)
@@ -139,12 +144,11 @@ class Equilibria:
     def barriers(self) -> tuple[Barrier, ...]:
         """From each minimum the saddles that a way down joins to it, lowest first, and their other side."""
         rows = []
-        for k in sorted({way.saddle for way in self.ways}):
-            one, other = (way for way in self.ways if way.saddle == k)
+        for one, other in pairs(self.ways):
             for here, there in ((one, other), (other, one)):
                 if here.to is not None:
-                    height = self[k].energy - self[here.to].energy
-                    rows.append(Barrier(here.to, k, there.to, height, there.end))
+                    height = self[here.saddle].energy - self[here.to].energy
+                    rows.append(Barrier(here.to, here.saddle, there.to, height, there.end))
         return tuple(sorted(rows, key=lambda row: (row.start, row.energy)))
 
     def barrier(self, start: int, to: int | None = None) -> float:

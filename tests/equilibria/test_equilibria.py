@@ -22,7 +22,7 @@ from generators import (
 )
 from pcmc import BoundaryMotion, Direction, Patch, Room, Surface, find_equilibria, follow, solve
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.equilibria import shape_distance
+from pcmc.equilibria import search, shape_distance
 from pcmc.equilibria.found import Equilibria, WayDown
 from pcmc.forces.functional import patch_areas
 
@@ -279,6 +279,18 @@ def test_a_search_that_is_stopped_keeps_what_it_has():
 def test_a_search_ends_at_the_most_equilibria_that_are_wanted():
     found = find_equilibria(spherical_cap(0.25), starts=0, most=1)
     assert len(found) == 1
+    assert "raise most" in str(found)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_search_that_ends_between_the_two_ways_down_has_no_barrier(monkeypatch, sign):
+    """On one side of Enneper's surface is the minimum that a low start has found, on the other one more."""
+    way_down = search.way_down
+    monkeypatch.setattr(search, "way_down", lambda saddle, mode: way_down(saddle, sign * mode))
+    saddle = solve(enneper(0.4, radius=1.2), target="stationary")
+    found = find_equilibria(saddle, (), starts=0, most=2)
+    assert [one.index for one in found.found] == [0, 1]
+    assert not found.barriers
     assert "raise most" in str(found)
 
 
