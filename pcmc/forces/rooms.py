@@ -31,7 +31,6 @@ from ..surface.topology import components
 from .functional import energy, patch_volumes, weighted
 
 CLEAR = 0.01  # of a sixth of a cell: beyond that a volume is no whole number of them
-SIDES = [1, 2, 0], [2, 0, 1]  # the corners at which the side opposite each corner starts and ends
 
 
 def room_volumes(surface: Surface, X: Floats | None = None) -> Floats:
@@ -186,22 +185,20 @@ def _whole_sixths(surface: Surface) -> Floats:
     It is a whole number of sixths of the cell, by which vertices stand for their images alone. In coordinates
     x, y, z along the lattice a room has the volume, but for whole cells,
 
-        Σ_T ∫ x dy dz - Σ_e m (∫ y dz - k z_b)
+        Σ_T ∫ x dy dz - Σ_e m (∫ y dz - k_b z_b + k_a z_a)
 
-    over its triangles, each in one piece, and its edges from vertex a to b. Over an edge x jumps by the whole
-    number m from triangle to triangle, and at its end y differs from that of vertex b by the whole number k.
+    over its triangles, each in one piece, and its edges from a to b. Over an edge x jumps by the whole number
+    m from triangle to triangle; at its ends y differs from those of the vertices a and b by k_a and k_b.
     """
     T, topo = lattice_of(surface), surface.topology
     X = (surface.vertices - surface.origin) @ np.linalg.inv(T)
-    C = X[surface.faces]
-    _, y, z = np.moveaxis(C - C[:, :1], 2, 0)
-    volume = 0.5 * C[..., 0].mean(axis=1) * (y[:, 1] * z[:, 2] - y[:, 2] * z[:, 1])
-    ascends = (topo.sense > 0)[..., None]
-    start, end = (np.where(ascends, C[:, one], C[:, other]) for one, other in (SIDES, SIDES[::-1]))
-    a, b = np.moveaxis(X[topo.edges[topo.edge_of_face]], 2, 0)
-    jump, step = topo.sense * np.rint(start - a)[..., 0], end - start
-    k = np.rint(a + step - b)[..., 1]
-    volume -= (jump * ((a + 0.5 * step)[..., 1] * step[..., 2] - k * b[..., 2])).sum(axis=1)
+    corners, ends, vertices, edge = X[surface.faces], X[topo.sides], X[topo.edges], topo.edge_of_face
+    x, (_, y, z) = corners[..., 0], np.moveaxis(corners - corners[:, :1], 2, 0)
+    volume = 0.5 * x.mean(axis=1) * (y[:, 1] * z[:, 2] - y[:, 2] * z[:, 1])
+    k = np.rint(ends - vertices)[..., 1]
+    along = ends[..., 1].mean(axis=1) * np.diff(ends[..., 2])[:, 0] - np.diff(k * vertices[..., 2])[:, 0]
+    start = np.where(topo.sense > 0, x[:, [1, 2, 0]], x[:, [2, 0, 1]])
+    volume -= (topo.sense * np.rint(start - ends[edge, 0, 0]) * along[edge]).sum(axis=1)
     of_patch, cell = np.bincount(surface.patch_of_face, volume, len(surface.patches)), np.linalg.det(T)
     share, reached = (surface.room_signs @ of for of in (np.sign(cell) * of_patch, patch_volumes(surface)))
     sixths = 6.0 * (share % 1.0 - reached / abs(cell))
