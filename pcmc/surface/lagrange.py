@@ -190,7 +190,7 @@ def shapes(order: int) -> Shapes:
     """The shape functions at points that integrate (x, x_ξ × x_η) exactly, of degree 3p - 2.
 
     Up to order 2 the rules of degree 1 and 5 that treat the corners alike (Radon 1948); above, Gauss's in ξ
-    and in η/(1 - ξ), whose degree leaves room for the factor 1 - ξ of the area (Stroud 1971).
+    and in η/(1 - ξ), with Jacobi's weight (Stroud 1971).
 
     >>> [len(shapes(order).weight) for order in ORDERS]
     [1, 7, 36, 144]
@@ -204,10 +204,13 @@ def shapes(order: int) -> Shapes:
         points = np.concatenate([np.full((1, 3), 1.0 / 3.0), *rings])
         weight = np.repeat([270.0, 155.0 - root, 155.0 + root], [1, 3, 3]) / 2400.0
     else:
+        from scipy.special import roots_jacobi  # it takes long to import
+
         t, dt = _gauss(order)
-        xi, share = (grid.ravel() for grid in np.meshgrid(t, t, indexing="ij"))
+        s, ds = roots_jacobi(len(t), 1, 0)
+        xi, share = (grid.ravel() for grid in np.meshgrid(0.5 * (1.0 + s), t, indexing="ij"))
         points = np.stack([(1.0 - xi) * (1.0 - share), xi, (1.0 - xi) * share], axis=1)
-        weight = (1.0 - xi) * np.outer(dt, dt).ravel()
+        weight = 0.25 * np.outer(ds, dt).ravel()
     return Shapes(*(read_only(np.ascontiguousarray(a)) for a in (*shape_functions(order, points), weight)))
 
 
