@@ -169,9 +169,8 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
     worst = f"worst is face {face} of patch {surface.patches[surface.patch_of_face[face]].name!r} near"
     worst += f" {point_text(place, surface.size)}, quality {quality:.1e}"
     if films := vanished_films(surface):
-        film = film_of(surface, surface.patch_index(films[0]))
+        meeting = film_of(surface, films[0]).meeting(surface, "then")
         others = f" and {len(films) - 1} more" if len(films) > 1 else ""
-        meeting = film.meeting(surface, "then") if film else ""
         return f"{worst}; patch {films[0]!r}{others} may vanish: {meeting}; {SWAP}"
     if held_wall_down(surface, pinchable):
         worst += "; the junction there comes down on the held bottom of its wall, so the wall has no height"

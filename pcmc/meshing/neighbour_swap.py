@@ -70,12 +70,12 @@ class Film:
         return f"{name[a]} and {name[c]} {when} meet, and {name[b]} and {name[d]}"
 
 
-def film_of(surface: Surface, patch: int) -> Film | None:
-    """The strip that a patch is; None for one of another shape, or without four different patches beside it.
+def film_of(surface: Surface, name: str) -> Film:
+    """The strip that a patch is; SurfaceError for another shape, or without four different patches beside it.
 
     A film with further sides at junctions, such as a wall below a roof, is a strip across the short ones.
     """
-    topo, original = surface.topology, surface.original
+    topo, original, patch = surface.topology, surface.original, surface.patch_index(name)
     curves = [curve for curve in topo.junctions if patch in curve.sheets]
     edges = [topo.sides[topo.edge_numbers(curve.pairs)] for curve in curves]
     lengths = [float(segment_lengths(surface.vertices, own).sum()) for own in edges]
@@ -90,7 +90,8 @@ def film_of(surface: Surface, patch: int) -> Film | None:
         if strip and surface.fixed[original[sorted(ends[i] & ends[j])]].all():
             found.append((sum(lengths[k] for k in rest), i, j))
     if not found:
-        return None
+        text = f"patch {name!r} is no film between two junctions with two other patches each, four in all;"
+        raise SurfaceError(f"{text} only the neighbours of a film can be swapped", what="patch", where=name)
     _, i, j = min(found)
     one, other = curves[i], curves[j]
     pairs, width = _across(surface, one, other)
@@ -224,10 +225,7 @@ def collapsed(surface: Surface, patch: str) -> tuple[Film, _Mesh, Ints]:
     SurfaceError as of ``swap``: it is no film between two junctions, or something holds it open.
     """
     expect_flat(surface.cell, "swap")
-    film = film_of(surface, surface.patch_index(patch))
-    if film is None:
-        text = f"patch {patch!r} is no film between two junctions with two other patches each, four in all;"
-        raise SurfaceError(f"{text} only the neighbours of a film can be swapped", what="patch", where=patch)
+    film = film_of(surface, patch)
     own = surface.faces[surface.patch_of_face == film.patch]
     if cables := [cable.name for cable in surface.cables if np.isin(cable.edges, own).any()]:
         text = f"cable {cables[0]!r} runs on or to patch {patch!r}, whose neighbours are to be swapped"
