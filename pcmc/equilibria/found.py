@@ -124,21 +124,14 @@ class Equilibria:
     @property
     def table(self) -> pd.DataFrame:
         """A row per equilibrium: number, index, energy, height, volume, eigenvalue, verdict, mesh, found."""
-        rows = [
-            {
-                "number": k,
-                "index": one.index,
-                "energy": one.energy,
-                "height": one.height,
-                "volume": volume_below(one.surface),
-                "lowest_eigenvalue": float(one.certificate.eigenvalues[0]),
-                "verdict": one.certificate.verdict.name.lower(),
-                "mesh": "" if one.mesh_check is None else one.mesh_check.verdict.name.lower(),
-                "found": one.found,
-            }
-            for k, one in enumerate(self.found, 1)
-        ]
-        return pd.DataFrame(rows)
+        rows = []
+        for k, one in enumerate(self.found, 1):
+            values = one.index, one.energy, one.height, volume_below(one.surface)
+            eigenvalue, verdict = float(one.certificate.eigenvalues[0]), one.certificate.verdict.name.lower()
+            mesh = "" if one.mesh_check is None else one.mesh_check.verdict.name.lower()
+            rows.append([k, *values, eigenvalue, verdict, mesh, one.found])
+        head = ["number", "index", "energy", "height", "volume", "lowest_eigenvalue"]
+        return pd.DataFrame(rows, columns=[*head, "verdict", "mesh", "found"])
 
     @property
     def barriers(self) -> tuple[Barrier, ...]:
@@ -179,6 +172,7 @@ class Equilibria:
         numbers = shown.select_dtypes(float).columns
         table = shown.assign(**{name: shown[name].map("{:.6g}".format) for name in numbers})
         rows = table.rename(columns=lambda name: name.replace("_", " ")).to_string(index=False)
+        rows = rows if self.found else "No equilibrium was found."
         half = ", ".join(self.found[0].certificate.symmetric_in) if self.found else ""
         if half:
             half = f"All this is of a part of the roof; shapes that are not symmetric in {half} were left out"
