@@ -107,7 +107,7 @@ def lattice_steps(lattice: Floats, vectors: Floats) -> Ints:
 
 
 def shortest(lattice: Floats, vectors: Floats) -> Floats:
-    """Vectors (…,3) to what is nearest of all that these translations (d,3) bring to where they lead."""
+    """(…,3) the shortest of all vectors that differ from these (…,3) by translations of a lattice (d,3)."""
     return np.asarray(vectors - lattice_steps(lattice, vectors) @ lattice)
 
 
@@ -143,7 +143,7 @@ def _apart(surface: Surface, curve: EdgeCurve, one: int, other: int) -> Floats:
 
 
 def swap(surface: Surface, patch: str) -> tuple[Surface, str]:
-    """The surface with other neighbours of a film between two junctions, not solved; a sentence who meets.
+    """The surface with other neighbours of a film between two junctions, not solved; and in words who meets.
 
     The new film has the name, tension and weight of the old one. Its pressure, its snow and the rooms that
     it bounds follow from the sheets beside it. A roof over the film goes along: the patches at its sides
