@@ -19,7 +19,7 @@ from ..base.tolerances import ON
 from ..forces.functional import energy, patch_volumes
 from ..forces.rooms import prescribed_volumes
 from ..surface import Patch, Room, Surface
-from ..surface.geometry import area_vectors, edge_vectors, face_areas, segment_lengths
+from ..surface.geometry import area_vectors, edge_vectors, face_areas, segment_lengths, vertex_sums
 from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.supports import apply_supports
@@ -255,14 +255,11 @@ def collapsed(surface: Surface, patch: str) -> tuple[Film, _Mesh, Ints]:
 def _opening(surface: Surface, film: Film, mesh: _Mesh, edges: Ints) -> Floats | None:
     """(n,3) the unit vectors along which the curve opens towards A and C; None where it stays closed."""
     at, beside = mask_of(edges, len(mesh.X)), mesh.beside(film, edges)
-    P, patch = mesh.corners(surface)[beside], mesh.patch[beside]
-    normal, area = area_vectors(P), face_areas(P)
-    weight = 0.5 * surface.tensions[patch] / np.where(area > 0.0, area, 1.0)
-    pull = np.zeros((len(surface.patches), *mesh.X.shape))  # of each sheet, - α ∂A/∂x, (15a)
-    corner_pull = weight[:, None, None] * np.cross(edge_vectors(P), normal[:, None])
-    np.add.at(pull, (patch[:, None], mesh.vertices[beside]), corner_pull)
-    (a, c), (b, d) = film.one_side, film.other_side
-    new, old = 0.5 * (pull[a] + pull[c] - pull[b] - pull[d]), 0.5 * (pull[a] + pull[b] - pull[c] - pull[d])
+    P, V, patch = mesh.corners(surface)[beside], mesh.vertices[beside], mesh.patch[beside]
+    normal = area_vectors(P) / np.maximum(face_areas(P), 1e-300)[:, None]
+    pull = 0.25 * surface.tensions[patch, None, None] * np.cross(edge_vectors(P), normal[:, None])  # (15a)
+    sides = (np.isin(patch, pair)[:, None, None] for pair in (film.one_side, film.sheets[::2]))  # A, C; A, B
+    new, old = (vertex_sums(np.where(side, pull, -pull), V, len(at)) for side in sides)
     guided = mesh.supports[:, 2 + len(surface.on_planes) :].any(axis=1)
     at &= ~mesh.supports[:, 0] | guided  # a fixed end stays one
     span = shortest(lattice_of(surface), mesh.X[edges[:, 1]] - mesh.X[edges[:, 0]])
