@@ -21,6 +21,7 @@ from pcmc.structure import Member, Profile, analyse
 from pcmc.structure.frames import turns
 from pcmc.structure.inp import text_of
 from pcmc.structure.member_forces import (
+    held_turns,
     member_tables,
     members_at_rest,
     weak_members,
@@ -51,6 +52,24 @@ def test_a_beam_whose_end_slides_along_it_bends_as_one_with_both_ends_held():
     )
     assert rolls.within[:, 1:] == pytest.approx(held.within[:, 1:], abs=1e-9)
     assert rolls.displacements[:, 1:] == pytest.approx(held.displacements[:, 1:], abs=1e-12)
+
+
+def test_a_hinge_of_a_curved_beam_holds_its_twist_about_the_tangent_with_order_two():
+    off = []
+    for n in (8, 16, 32):
+        angle = np.linspace(-1.0, 1.0, n + 1)
+        arc = np.stack([np.sin(angle), np.cos(angle), 0.0 * angle], axis=1)
+        fan = [[n + 1, k + 1, k] for k in range(n)]
+        film = pcmc.Surface(
+            [*arc, [0, 0, 0]], fan, [0] * n, [pcmc.Patch("film", 2.0, 0.0)], fixed=range(n + 2)
+        )
+        model = model_of(film, members=[Member(polyline(arc.tolist()), TUBE, STEEL)], anyway=True)
+        held = held_turns(model, film.vertices)
+        assert set(held) == {0, n}
+        assert [len(turns) for turns in held.values()] == [1, 1]
+        off.append(abs(held[0][0] @ [np.sin(-1.0), np.cos(-1.0), 0.0]))
+    assert off[-1] < 1e-3
+    assert np.polyfit(np.log([8, 16, 32]), np.log(off), 1)[0] < -1.9
 
 
 def test_beams_have_nodes_of_their_own_tied_to_the_vertices_where_these_are(tmp_path):
