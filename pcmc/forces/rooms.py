@@ -88,8 +88,10 @@ def pressure_shares(surface: Surface) -> Floats:
 
     A wall has the difference to the air beyond it. It counts only where rooms have nothing else.
     """
+    if not surface.rooms:  # numpy 2.1 refuses no rows
+        return surface.room_signs
     signs = surface.room_signs * surface.roof
-    whole = not surface.rooms or np.linalg.matrix_rank(signs) == len(signs)  # numpy 2.1 refuses no rows
+    whole = np.linalg.matrix_rank(signs) == len(signs)
     return np.asarray(np.linalg.pinv((signs if whole else surface.room_signs).T), dtype=np.float64)
 
 
