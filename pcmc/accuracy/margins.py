@@ -349,10 +349,11 @@ def _where(end: End, mode: Floats) -> str:
     if not motion.any():
         return ""
     roof, most = np.flatnonzero(surface.roof), int(motion.argmax())
-    through, size = np.zeros((2, len(surface.patches)))
+    (through, size), outward = np.zeros((2, len(surface.patches))), 0.0
     for k in roof:
         vectors, areas = vertex_area_vectors(surface.vertices, surface.faces[surface.patch_of_face == k])
         through[k], size[k] = (mode * vectors).sum(), motion @ areas
+        outward += mode[most] @ vectors[most]
     near = np.unique(surface.patch_of_face[(surface.faces == most).any(axis=1)])
     largest = int(roof[size[roof].argmax()]) if len(roof) else int(near[0])
     turns = end.ends_by is MarginEnd.BIFURCATION  # to either side
@@ -361,7 +362,8 @@ def _where(end: End, mode: Floats) -> str:
         return f"{part} {'inflates' if through[largest] > 0.0 else 'sinks'}{' or the opposite' * turns}"
     names = " | ".join(surface.patches[k].name for k in near[:3]) + " …" * (len(near) > 3)
     part = f"the junction {names}" if len(near) > 1 else repr(surface.patches[near[0]].name)
-    return f"{part} sways to one side, most near {point_text(surface.vertices[most], surface.size)}"
+    way = "sways to one side" if turns or len(near) > 1 else f"moves {'out' if outward > 0.0 else 'in'}"
+    return f"{part} {way}, most near {point_text(surface.vertices[most], surface.size)}"
 
 
 @lru_cache(maxsize=4)

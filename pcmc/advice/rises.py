@@ -67,7 +67,7 @@ def take_rises(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Rise]]:
     rises = [rise for name, values in patches.items() for rise in taken(values, RISES, name)]
     if not patches and "tension" not in plan:
         rises = taken(plan, WHOLE, None)
-    elif misplaced := [key for key in WHOLE[1:] if key in plan]:
+    elif misplaced := [key for key in WHOLE if key in plan]:
         text = f"plan.{misplaced[0]} is for a plan without tensions; remove it, or the tensions"
         raise OptionError(text, what=f"plan.{misplaced[0]}")
     return {**data, "plan": plan | ({"patches": patches} if patches else {})}, rises

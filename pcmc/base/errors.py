@@ -121,6 +121,7 @@ def unknown(what: str, found: object, known: Iterable[str], note: str = "") -> s
     names = list(known)
     near = [name for name in names if name.casefold() == str(found).casefold()]
     near = near or get_close_matches(str(found), names, n=1)
+    near = near or [name for name in names if name.startswith(f"{found} ")]
     notes = [f"did you mean {name!r}?" for name in near[:1]] + [note] * bool(note)
     listed = f"{'Known' if notes else 'known'}: {', '.join(names) or '(none)'}"
     return f"unknown {what} {found!r}; {' '.join([*notes, listed])}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,8 +12,9 @@ from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints, mask_of
+from ..base.errors import SurfaceError
 from ..base.tolerances import PINCHED
-from ..meshing.neighbour_swap import can_vanish, film_of
+from ..meshing.neighbour_swap import collapsed, film_of
 from ..meshing.quality import edge_lengths, triangle_quality
 from ..surface import Surface
 from ..surface.geometry import area_vectors, face_areas, segment_lengths
@@ -167,9 +169,8 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
     worst = f"worst is face {face} of patch {surface.patches[surface.patch_of_face[face]].name!r} near"
     worst += f" {point_text(place, surface.size)}, quality {quality:.1e}"
     if films := vanished_films(surface):
-        film = film_of(surface, surface.patch_index(films[0]))
+        meeting = film_of(surface, films[0]).meeting(surface, "then")
         others = f" and {len(films) - 1} more" if len(films) > 1 else ""
-        meeting = film.meeting(surface, "then") if film else ""
         return f"{worst}; patch {films[0]!r}{others} may vanish: {meeting}; {SWAP}"
     if held_wall_down(surface, pinchable):
         worst += "; the junction there comes down on the held bottom of its wall, so the wall has no height"
@@ -184,13 +185,13 @@ def where_collapsed(surface: Surface, pinchable: Bools) -> str:
 def vanished_films(surface: Surface) -> list[str]:
     """The films that have vanished and nothing holds open, by name: narrow, and small beside the others."""
     areas = face_areas(surface.vertices[surface.faces])
-    area = np.bincount(surface.patch_of_face, areas, len(surface.patches))
-    names = []
+    area, names = np.bincount(surface.patch_of_face, areas, len(surface.patches)), list[str]()
     for patch in np.flatnonzero(area < NARROW * area.max()):
-        film = film_of(surface, int(patch))
-        if film and area[patch] < NARROW * area[list(film.sheets)].min() and film.width < 2.0 * film.height:
-            names.append(surface.patches[patch].name)
-    return [name for name in names if can_vanish(surface, name)]
+        with suppress(SurfaceError):  # it is no film, or held open
+            film = collapsed(surface, surface.patches[patch].name)[0]
+            if area[patch] < NARROW * area[list(film.sheets)].min() and film.width < 2.0 * film.height:
+                names.append(surface.patches[patch].name)
+    return names
 
 
 def held_wall_down(surface: Surface, pinchable: Bools) -> bool:

@@ -27,7 +27,7 @@ from ..forces.pinching import standing_part
 from ..forces.triangles import totals_and_gradient
 from ..surface import Plane, Surface
 from ..surface.checks import lying
-from ..surface.geometry import segment_lengths, vertex_sums
+from ..surface.geometry import end_tangent, segment_lengths, vertex_sums
 from ..surface.parts import Cable
 from ..surface.supports import apply_supports, symmetric_part
 from ..surface.topology import EdgeCurve
@@ -344,16 +344,14 @@ def cable_ends(
 ) -> list[CableEnd]:
     """Each end of a part of a cable: the cable, the vertex, and the force -(τ + g z) t (3,) that holds it; or
     with other positions X (n,3) and ``tensions`` (k,) of the edges of each cable, by name. t is the tangent
-    there: the last edge's direction turns on by its share of the bend between the last two edges."""
+    there, ``end_tangent``."""
     found, X = [], surface.vertices if X is None else X
     for cable, curve in cable_parts(surface):
         for pair, pairs in zip(curve.ends, (curve.pairs[:2], curve.pairs[:-3:-1, ::-1]), strict=False):
             pull = pull_along(surface, cable, pair[:1])
             if tensions is not None:
                 pull = tensions[cable.name][(np.sort(cable.edges, axis=1) == np.sort(pair)).all(axis=1)]
-            t, length = directions(X, pairs)
-            tangent = t[0] + (t[0] - t[-1]) * length[0] / length.sum()
-            found.append((cable, int(pair[0]), -pull * tangent / np.linalg.norm(tangent)))
+            found.append((cable, int(pair[0]), -pull * end_tangent(*directions(X, pairs))))
     return found
 
 

@@ -7,7 +7,10 @@ import gc
 import os
 import sys
 import warnings
+from collections.abc import Callable
+from functools import cache
 from itertools import repeat
+from typing import Any
 
 from ..base import errors
 from ..base.errors import MissingExtra, PcmcError
@@ -48,14 +51,10 @@ def _run(arguments: list[str]) -> int:
     try:
         for library in ("typer", "rich"):
             require(library, extra="cli")
-        import typer
-
-        from .app import app
-
+        command = _command()
         if not gc.isenabled():  # ``main`` pauses it
             gc.freeze()
             gc.enable()
-        command = typer.main.get_command(app)
         arguments = ["--allow-uncertified" if one == "--anyway" else one for one in arguments]
         code = command(args=arguments or ["--help"], prog_name="pcmc", standalone_mode=False)
         if sys.stdout is not None:  # None if the shell closed it
@@ -87,6 +86,16 @@ def _run(arguments: list[str]) -> int:
         path = getattr(getattr(error, "ctx", None), "command_path", "pcmc")
         _say(f"error: {error.format_message()} (see {path} --help)")
         return BAD_INPUT
+
+
+@cache
+def _command() -> Callable[..., Any]:
+    """The command with its options, which takes as long to build as a small file to read."""
+    import typer
+
+    from .app import app
+
+    return typer.main.get_command(app)
 
 
 def _plain(error: UnicodeError) -> tuple[bytes, int]:

@@ -18,7 +18,6 @@ __all__ = ["KINDS", "MEASURES", "Parameter", "Target", "as_parameters", "as_targ
 
 NAMED = {"curvature": "patch", "pressure": "room"} | dict.fromkeys(("sag", "length", "force"), "cable")
 """Quantities of one patch, room or cable alone."""
-SHORT = {"reaction": "reaction per length"}  # names that stand for others
 
 
 def _margin(surface: Surface, of: str | None) -> Measurement:
@@ -40,11 +39,11 @@ class Target:
     ----------
     quantity : ``"apex"``, greatest height over Π of a patch; ``"height"`` over a point of Π; ``"volume"``
         between a patch and Π (``volumes_below``), and ``"area"``; ``"curvature"``, (p - s) / (2α), a patch's
-        mean curvature at rest; ``"reaction per length"`` or ``"reaction"``, the greatest pull along an edge
-        that holds a patch; ``"lean"`` of a wall, its largest angle from the vertical, degrees; ``"margin"``,
-        the factor of ``pcmc.margin`` up to which the roof stays stable; ``"pressure"`` of a room of
-        prescribed volume; of a cable ``"sag"``, the largest distance of its vertices from the chord between
-        its ends, its ``"length"``, and its ``"force"``, which is its tension.
+        mean curvature at rest; ``"reaction per length"``, the greatest pull along an edge that holds a
+        patch; ``"lean"`` of a wall, its largest angle from the vertical, degrees; ``"margin"``, the factor
+        of ``pcmc.margin`` up to which the roof stays stable; ``"pressure"`` of a room of prescribed volume;
+        of a cable ``"sag"``, the largest distance of its vertices from the chord between its ends, its
+        ``"length"``, and its ``"force"``, which is its tension.
     of : name of the patch, room or cable; what a margin varies, such as ``"tension of west"``, by default
         the pressure; for ``"height"`` the point (x, y) in the coordinates of Π. By default all patches
         under pressure together (for reactions all edges that are held), where the quantity is not of one
@@ -72,8 +71,7 @@ class Target:
     name: str = ""
 
     def __post_init__(self) -> None:
-        quantity = validate.choice("quantity", SHORT.get(str(self.quantity), self.quantity), tuple(MEASURES))
-        object.__setattr__(self, "quantity", quantity)
+        validate.choice("quantity", self.quantity, tuple(MEASURES))
         if self.quantity == "height":
             object.__setattr__(self, "of", _point(self.of))
         elif not (isinstance(self.of, str) or (self.of is None and self.quantity not in NAMED)):

@@ -56,12 +56,9 @@ class TracedParameter:
             validate.refuse("span", (low, high), f"numbers below and above the present value {value:g}")
         return cls(name, parameter, value, (low, high))
 
-    def halves(self, surface: Surface, watch: Callable[[Progress], None]) -> tuple[Branch, Branch] | str:
-        """The branch through a surface, each way to the end of the span; or why none starts there."""
-        try:
-            return self._half(surface, -1.0, watch), self._half(surface, 1.0, watch)
-        except NoBranch as error:
-            return str(error)
+    def halves(self, surface: Surface, watch: Callable[[Progress], None]) -> tuple[Branch, Branch]:
+        """The branch through a surface, each way to the end of the span; NoBranch if none starts there."""
+        return self._half(surface, -1.0, watch), self._half(surface, 1.0, watch)
 
     def early_end(self, branch: Branch) -> tuple[float, str] | None:
         """Where and why a branch ends within the span; None if it leads out of it."""
@@ -82,21 +79,14 @@ class TracedParameter:
                 break
         return branch
 
-    def bifurcations(self, branch: Branch) -> Iterator[tuple[int, float]]:
-        """The rows of those within the span, and their values of λ."""
-        for row, value in branch.bifurcations.parameter.items():
-            if self.span[0] < value < self.span[1]:
-                yield int(str(row)), float(value)
-
     def leaving(self, branch: Branch, row: int, watch: Callable[[Progress], None]) -> list[Branch]:
         """The two branches that leave one at a bifurcation, from there on; OptionError if none is found."""
         event, found = branch.events.loc[row], []
         for one in map(self._ended, branch.switch(row, steps=STEPS, callback=self._within(watch))):
-            points = one.points
-            known = {name: event[name] for name in points.columns.intersection(event.index)}
-            at_event = points.iloc[0].to_dict() | known | {"arclength": -FIRST, "slope": 0.0}
+            known = {name: event[name] for name in one.points.columns.intersection(event.index)}
+            first = one.points[:1].assign(**known | {"arclength": -FIRST, "slope": 0.0})
             surfaces = {0: branch.event_surfaces[row]} | {k + 1: s for k, s in one.surfaces.items()}
-            points = pd.concat([pd.DataFrame([at_event]), points], ignore_index=True)
+            points = pd.concat([first, one.points], ignore_index=True)
             found.append(replace(one, points=points, surfaces=surfaces))
         return found
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -64,6 +64,11 @@ class WayDown:
     end: str = ""
 
 
+def pairs(ways: Sequence[WayDown]) -> Iterator[tuple[WayDown, WayDown]]:
+    """The two ways down from each saddle, which follow each other."""
+    return zip(ways[::2], ways[1::2], strict=True)
+
+
 @dataclass(frozen=True)
 class Barrier:
     """The energy that leads from a minimum over a saddle, and where that leads."""
@@ -119,32 +124,24 @@ class Equilibria:
     @property
     def table(self) -> pd.DataFrame:
         """A row per equilibrium: number, index, energy, height, volume, eigenvalue, verdict, mesh, found."""
-        rows = [
-            {
-                "number": k,
-                "index": one.index,
-                "energy": one.energy,
-                "height": one.height,
-                "volume": volume_below(one.surface),
-                "lowest_eigenvalue": float(one.certificate.eigenvalues[0]),
-                "verdict": one.certificate.verdict.name.lower(),
-                "mesh": "" if one.mesh_check is None else one.mesh_check.verdict.name.lower(),
-                "found": one.found,
-            }
-            for k, one in enumerate(self.found, 1)
-        ]
-        return pd.DataFrame(rows)
+        rows = []
+        for k, one in enumerate(self.found, 1):
+            values = one.index, one.energy, one.height, volume_below(one.surface)
+            eigenvalue, verdict = float(one.certificate.eigenvalues[0]), one.certificate.verdict.name.lower()
+            mesh = "" if one.mesh_check is None else one.mesh_check.verdict.name.lower()
+            rows.append([k, *values, eigenvalue, verdict, mesh, one.found])
+        head = ["number", "index", "energy", "height", "volume", "lowest_eigenvalue"]
+        return pd.DataFrame(rows, columns=[*head, "verdict", "mesh", "found"])
 
     @property
     def barriers(self) -> tuple[Barrier, ...]:
         """From each minimum the saddles that a way down joins to it, lowest first, and their other side."""
         rows = []
-        for k in sorted({way.saddle for way in self.ways}):
-            one, other = (way for way in self.ways if way.saddle == k)
+        for one, other in pairs(self.ways):
             for here, there in ((one, other), (other, one)):
                 if here.to is not None:
-                    height = self[k].energy - self[here.to].energy
-                    rows.append(Barrier(here.to, k, there.to, height, there.end))
+                    height = self[here.saddle].energy - self[here.to].energy
+                    rows.append(Barrier(here.to, here.saddle, there.to, height, there.end))
         return tuple(sorted(rows, key=lambda row: (row.start, row.energy)))
 
     def barrier(self, start: int, to: int | None = None) -> float:
@@ -174,7 +171,8 @@ class Equilibria:
         shown = self.table.drop(columns=["mesh"] * (not any(one.mesh_check for one in self.found)))
         numbers = shown.select_dtypes(float).columns
         table = shown.assign(**{name: shown[name].map("{:.6g}".format) for name in numbers})
-        rows = table.rename(columns=lambda name: name.replace("_", " ")).to_string(index=False)
+        table = table.rename(columns=lambda name: name.replace("_", " "))
+        rows = table.to_string(index=False) if self.found else "No equilibrium was found."
         half = ", ".join(self.found[0].certificate.symmetric_in) if self.found else ""
         if half:
             half = f"All this is of a part of the roof; shapes that are not symmetric in {half} were left out"

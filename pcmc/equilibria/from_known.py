@@ -13,6 +13,7 @@ which turns back (c < 0) where that would lead to a known one.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -49,29 +50,23 @@ def deflated_newton(start: Surface, known: Sequence[Shape]) -> Result | None:
 
     It may be one of those known: where the way to the last steps is Newton's own.
     """
-    near = _deflated(start, known)
-    if near is None:
-        return None
-    result = solve_once(near, target="stationary")
-    return result if result.converged else None
-
-
-def _deflated(start: Surface, known: Sequence[Shape]) -> Surface | None:
-    """Where the deflated steps from a start come near to rest; None where they fail."""
-    try:
+    with suppress(SingularMatrix):
         state = SolverState(start, MIN_QUALITY)
         stepper = Stepper(state, minimum=False)
         for _ in range(STEPS):
             if not np.isfinite(state.energy) or state.quality < COLLAPSED:
-                return None
+                break
             if state.at.residual < NEAR:
-                return state.result_surface()
+                return _stationary(state.result_surface())
             if not _deflated_step(state, stepper, known):
-                return None
+                break
             state.maintain_mesh()
-    except SingularMatrix:
-        pass
     return None
+
+
+def _stationary(start: Surface) -> Result | None:
+    result = solve_once(start, target="stationary")
+    return result if result.converged else None
 
 
 def _deflated_step(state: SolverState, stepper: Stepper, known: Sequence[Shape]) -> bool:
@@ -124,10 +119,7 @@ def pass_between(one: Surface, other: Surface) -> Result | None:
     shares = np.linspace(0.0, 1.0, IMAGES + 2)
     ways = [(1.0 - t) * one.vertices + t * other.vertices for t in shares]
     highest = int(np.argmax([energy_at(one, X) for X in ways]))
-    if highest in (0, len(ways) - 1):
-        return None
-    result = solve_once(one.moved(ways[highest]), target="stationary")
-    return result if result.converged else None
+    return None if highest in (0, len(ways) - 1) else _stationary(one.moved(ways[highest]))
 
 
 def with_good_triangles(surface: Surface) -> Surface:
@@ -139,9 +131,8 @@ def with_good_triangles(surface: Surface) -> Surface:
     if worst_quality(part.surface.vertices, part.quality_faces) >= MIN_QUALITY:
         return surface
     edge = (4.0 / 3.0**0.5 * float(patch_areas(surface).sum()) / surface.m) ** 0.5
-    try:
-        result = solve_once(remesh(surface, edge), target="stationary")
-    except (MissingExtra, SurfaceError):
-        return surface
-    near = result.converged and Shape.of(result.surface).distance(Shape.of(surface)) <= edge
-    return result.surface if near else surface
+    with suppress(MissingExtra, SurfaceError):
+        result = _stationary(remesh(surface, edge))
+        if result is not None and Shape.of(result.surface).distance(Shape.of(surface)) <= edge:
+            return result.surface
+    return surface

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
@@ -11,10 +12,10 @@ import numpy as np
 
 from ..accuracy import check_mesh
 from ..base import validate
-from ..base.errors import OptionError, SurfaceError
+from ..base.errors import NoBranch, OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..base.tolerances import AT_REST
-from ..certificate import Certificate, certify
+from ..certificate import certify
 from ..solvers import solve
 from ..solvers.continuation import BoundaryMotion, Branch, Direction
 from ..solvers.result import Progress, Result, Status
@@ -22,7 +23,7 @@ from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
 from .branches import Span, TracedParameter, join_branches
-from .found import LOST, Equilibria, FoundEquilibrium, WayDown
+from .found import LOST, Equilibria, FoundEquilibrium, WayDown, pairs
 from .from_known import deflated_newton, pass_between, way_down, with_good_triangles
 from .shapes import Shape
 
@@ -149,42 +150,37 @@ def find_equilibria(
     return search.result()
 
 
+@dataclass(eq=False)
 class _Search:
     """What is known so far. Numbers count from 0 here, in the order in which equilibria are found."""
 
-    def __init__(
-        self,
-        surface: Surface,
-        lines: Sequence[TracedParameter],
-        options: SearchOptions,
-        callback: Callable[[str], None] | None,
-    ) -> None:
-        self.surface, self.lines, self.options, self.callback = surface, lines, options, callback
-        self.found: list[FoundEquilibrium] = []
-        self.shapes: list[Shape] = []
-        self.on_branch: set[int] = set()  # those that a branch has led to
-        self.ways: list[WayDown] = []
-        self.branches: dict[str, list[Branch]] = {line.name: [] for line in lines}
-        self.left: dict[str, list[tuple[float, Shape]]] = {line.name: [] for line in lines}  # at bifurcations
-        self.tried: set[tuple[int, int]] = set()  # pairs of minima
-        self.failed: list[str] = []
-        self.early_ends: dict[tuple[str, str], list[float]] = {}  # by parameter and reason
-        self.starts = self.arrived = 0
-        self.stopped = False
+    surface: Surface
+    lines: Sequence[TracedParameter]
+    options: SearchOptions
+    callback: Callable[[str], None] | None
+    found: list[FoundEquilibrium] = field(default_factory=list)
+    shapes: list[Shape] = field(default_factory=list)
+    on_branch: set[int] = field(default_factory=set)  # those that a branch has led to
+    ways: list[WayDown] = field(default_factory=list)
+    branches: dict[str, list[Branch]] = field(default_factory=lambda: defaultdict(list))
+    left: dict[str, list[tuple[float, Shape]]] = field(default_factory=lambda: defaultdict(list))
+    tried: set[tuple[int, int]] = field(default_factory=set)  # pairs of minima
+    failed: list[str] = field(default_factory=list)
+    early_ends: dict[tuple[str, str], list[float]] = field(default_factory=lambda: defaultdict(list))
+    starts = arrived = 0
+    stopped = False
 
     def run(self) -> None:
         self.tell("solving")
         self.first()
-        done = 0
-        while done < len(self.found):
-            while done < len(self.found):
-                if done not in self.on_branch:
-                    for line in self.lines:
-                        self.follow(line, done)
-                self.descend(done)
-                self.deflate(done)
-                done += 1
-            self.connect()
+        for number, _ in enumerate(self.found):  # it grows on the way
+            if number not in self.on_branch:
+                for line in self.lines:
+                    self.follow(line, number)
+            self.descend(number)
+            self.deflate(number)
+            if number == len(self.found) - 1:
+                self.connect()
         if self.options.mesh_check:
             for k, one in enumerate(self.found):
                 self.tell(f"mesh check of equilibrium {k + 1}")
@@ -196,27 +192,23 @@ class _Search:
 
     def first(self) -> None:
         """The surface given, solved if necessary, and the minimum from a low start."""
-        surface = self.surface
-        certificate = certify(surface, modes=min(MODES, surface.n))
-        if certificate.index is not None and certificate.residual <= AT_REST:
-            self.add(surface, "given", certificate)
-        else:
-            result = solve(surface)
+        if self.add(self.surface, "given") is None:
+            result = solve(self.surface)
             if not result.converged:
-                result = solve(surface, target="stationary")
+                result = solve(self.surface, target="stationary")
             if result.status is Status.STOPPED:
                 raise KeyboardInterrupt
             if not result.converged:
                 text = f"find_equilibria: no equilibrium was found to begin with; {result.message}"
                 raise SurfaceError(text, what="surface", found=result.status.name)
             self.add(result.surface, "from the start given")
-        low = low_start(surface)
+        low = low_start(self.surface)
         if low is not None and (result := solve(low)).converged:
             self.add(with_good_triangles(result.surface), "from a low start")
 
-    def add(self, surface: Surface, how: str, certificate: Certificate | None = None) -> int | None:
+    def add(self, surface: Surface, how: str) -> int | None:
         """The number of an equilibrium, new if its shape or index is; None if it cannot be certified."""
-        certificate = certificate or certify(surface, modes=min(MODES, surface.n))
+        certificate = certify(surface, modes=min(MODES, surface.n))
         if certificate.index is None or certificate.residual > AT_REST:
             return None
         shape = Shape.of(surface)
@@ -241,9 +233,10 @@ class _Search:
             text = f"The equilibrium {how} has a new mesh; no branch in {line.name} was followed from it"
             self.failed.append(f"{text}, as that moves the vertices of the boundary.")
             return
-        halves = line.halves(start, watch)
-        if isinstance(halves, str):
-            self.failed.append(f"No branch in {line.name} starts at the equilibrium {how}: {halves}.")
+        try:
+            halves = line.halves(start, watch)
+        except NoBranch as error:
+            self.failed.append(f"No branch in {line.name} starts at the equilibrium {how}: {error}.")
             return
         self.keep_early_ends(line, halves)
         level, how, led_to = [join_branches(*halves)], f"on a branch in {line.name}", {number}
@@ -260,7 +253,7 @@ class _Search:
 
     def keep_early_ends(self, line: TracedParameter, branches: Iterable[Branch]) -> None:
         for value, why in filter(None, map(line.early_end, branches)):
-            self.early_ends.setdefault((line.name, why), []).append(value)
+            self.early_ends[line.name, why].append(value)
 
     def told_early_ends(self) -> Iterator[str]:
         """A sentence for all branches of a parameter that ended for one reason."""
@@ -295,10 +288,12 @@ class _Search:
         self, line: TracedParameter, branch: Branch, watch: Callable[[Progress], None]
     ) -> list[Branch]:
         """The branches that leave one at bifurcations that none has been left at before."""
-        found, near = list[Branch](), SAME_VALUE * (line.span[1] - line.span[0])
-        for row, value in line.bifurcations(branch):
-            shape, known = Shape.of(branch.event_surfaces[row]), self.left[line.name]
-            if not any(abs(value - at) <= near and shape.same_as(other) for at, other in known):
+        (low, high), found, known = line.span, list[Branch](), self.left[line.name]
+        values: dict[Any, float] = branch.bifurcations.parameter.to_dict()
+        for row, value in values.items():
+            shape, near = Shape.of(branch.event_surfaces[row]), SAME_VALUE * (high - low)
+            left = any(abs(value - at) <= near and shape.same_as(other) for at, other in known)
+            if low < value < high and not left:
                 known.append((value, shape))
                 try:
                     found += line.leaving(branch, row, watch)
@@ -308,8 +303,7 @@ class _Search:
 
     def descend(self, number: int) -> None:
         """The ways down from a saddle, on both sides of each unstable mode that is known."""
-        one = self.found[number]
-        ends = list[str]()
+        one, ways = self.found[number], list[WayDown]()
         for mode in one.certificate.modes[: one.index]:
             self.tell(f"going down from equilibrium {number + 1}")
             for side in (mode, -mode):
@@ -320,9 +314,10 @@ class _Search:
                 if status is Status.CONVERGED:
                     to = self.add(with_good_triangles(surface), "on the way down from a saddle")
                 end = "" if to is not None else ENDS.get(status, f"{LOST} ({status.name.lower()})")
-                ends.append(end)
-                if one.index == 1:
-                    self.ways.append(WayDown(number, to, end))
+                ways.append(WayDown(number, to, end))
+        if one.index == 1:  # both at once, also where the search ends between them
+            self.ways += ways
+        ends = [way.end for way in ways]
         if any(ends) and (one.index > 1 or all(ends)):  # if one way of two leads on, a barrier has both
             lost = ", ".join(f"{end} ({ends.count(end)})" for end in sorted({*ends} - {""}))
             self.failed.append(f"The {len(ends)} ways down from a saddle of index {one.index}: {lost}.")
@@ -345,7 +340,7 @@ class _Search:
 
     def connect(self) -> None:
         """Try the straight way between minima that no saddle joins."""
-        joined = [{w.to for w in self.ways if w.saddle == k} for k in {w.saddle for w in self.ways}]
+        joined = [{one.to, other.to} for one, other in pairs(self.ways)]
         minima = [k for k, one in enumerate(self.found) if one.index == 0]
         for pair in combinations(minima, 2):
             one, other = (self.found[k].surface for k in pair)
@@ -362,18 +357,18 @@ class _Search:
         order = sorted(range(len(self.found)), key=lambda k: self.found[k].energy)
         number = {k: place for place, k in enumerate(order, 1)}
         ways = [WayDown(number[w.saddle], None if w.to is None else number[w.to], w.end) for w in self.ways]
-        every = [(line, self.branches[line.name]) for line in self.lines]
+        branches = {line.name: tuple(self.branches[line.name]) for line in self.lines}
         searched = [
             f"Branches followed in {line.name}, from {line.span[0]:.4g} to {line.span[1]:.4g}"
-            f" (now {line.value:.4g}): {len(branches)}."
-            for line, branches in every
+            f" (now {line.value:.4g}): {len(branches[line.name])}."
+            for line in self.lines
         ]
         searched.append(f"Deflated Newton: {self.starts} starts, {self.arrived} came to rest.")
         return Equilibria(
             found=tuple(self.found[k] for k in order),
             ways=tuple(sorted(ways, key=lambda way: way.saddle)),
             lines=tuple(self.lines),
-            branches={line.name: tuple(branches) for line, branches in every},
+            branches=branches,
             searched=tuple(searched),
             failed=(*dict.fromkeys(self.failed), *self.told_early_ends()),
             stopped=self.stopped,

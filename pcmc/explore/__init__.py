@@ -57,7 +57,7 @@ def open_and_wait(explorer: Explorer, open_browser: bool = True) -> None:
             webbrowser.open(explorer.url)
         explorer.wait()
     except KeyboardInterrupt:
-        pass
+        print("stopped: the page can compute and save nothing more")
     finally:
         explorer.close()
 

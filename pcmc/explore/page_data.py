@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import count
 from typing import Any
 from zlib import crc32
 
@@ -210,21 +209,17 @@ def target_choices(surface: Surface) -> list[dict[str, Any]]:
 
 
 def equilibria_data(found: Equilibria, units: Units = NO_UNITS) -> dict[str, Any]:
-    """The branches and equilibria of a search, each point with the number of its surface, and in words."""
-    (along,), numbers, branches = found.lines, count(len(found)), []
-    for branch in found.branches[along.name]:
-        shown = branch.points.loc[sorted(branch.surfaces)]
-        columns = {name: shown[name].tolist() for name in ("parameter", "height", "index")}
-        lines = branch.pieces("parameter", "height")
-        columns["number"] = [next(numbers) for _ in range(len(shown))]
-        columns["pieces"] = [{"stable": stable, "points": points.tolist()} for stable, points in lines]
-        branches.append(columns)
-    rows = found.table[["height", "index", "energy"]].to_dict(orient="records")
+    """The branches and equilibria of a search, and in words; in the order of ``found.surfaces``."""
+    (along,), columns = found.lines, ["parameter", "height", "index"]
+    branches = found.branches[along.name]
+    pieces = [piece for branch in branches for piece in branch.pieces(*columns[:2])]
+    shown = [branch.points.loc[sorted(branch.surfaces), columns] for branch in branches]
     return {
         "parameter": along.name,
         "value": along.value,
-        "branches": branches,
-        "equilibria": [row | {"number": k} for k, row in enumerate(rows)],
+        "pieces": [{"stable": stable, "points": points.tolist()} for stable, points in pieces],
+        "equilibria": found.table[["height", "index", "energy"]].to_dict(orient="records"),
+        "beside": [row for points in shown for row in points.to_dict(orient="records")],
         "words": [*found.barrier_lines(units), *found.failed, INCOMPLETE],
     }
 

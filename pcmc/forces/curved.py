@@ -7,14 +7,14 @@ subscripts ξ, η for derivatives, g = x_ξ × x_η, J = |g|, ν = g/J and m_i =
     V = ⅓ ∫ ⟨x, g⟩        ∂/∂x_i = ⅓ (N_i g + x × m_i)
     ∫ z dA = ∫ z J        ∂/∂x_i = z ν × m_i + N_i J n
 
-over dξ dη; z is the height of x over Π, whose normal is n, and V is seen from the reference point. Blocks are
+over dξ dη; z is the height of x over Π, whose normal is n, and V is seen from the reference point. So the
+forces of an element come from two vectors at each point of it, and their changes along d from those of these:
 
-    ∂²E/∂i∂j  =  ∫ s ν νᵀ + [q]× + u nᵀ + n vᵀ,    T = α + w z
-    s = T ⟨m_i, m_j⟩ / J,    q = (N_i,η N_j,ξ - N_i,ξ N_j,η)(T ν - ⅓ p x) + ⅓ p (N_j m_i - N_i m_j)
-    u = w N_j ν × m_i,       v = w N_i ν × m_j
+    ∂E/∂x_i = ∫ a × m_i + N_i b,    a = T ν - ⅓ p x,    b = w J n - ⅓ p g,    T = α + w z
+    δa = T (δg - δJ ν) / J + w ⟨n, d⟩ ν - ⅓ p d,    δb = w δJ n - ⅓ p δg,    δJ = ⟨ν, δg⟩
 
-and the *stiffness* is ∫ T₊ ⟨m_i, m_j⟩ / J, T₊ = α + max(w z, 0). Of order 1 these are the formulas of
-``triangles``, at one point; there they are written out.
+where δg = d_ξ × x_η + x_ξ × d_η, of node j m_j × d. The *stiffness* is ∫ T₊ ⟨m_i, m_j⟩ / J, T₊ = α +
+max(w z, 0). Of order 1 these are the formulas of ``triangles``, at one point; there they are written out.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ from ..base.compiled import compiled, inlined
 from ..surface.geometry import accumulate, add, cross, cross_sum, dot, norm, point, scaled, sub, vector
 from ..surface.lagrange import Shapes
 from .elements import Mesh
+
+UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @inlined
@@ -70,11 +72,23 @@ def measure_elements(
             moment[k] += dA * z * J
             if len(out) == 0:
                 continue
-            pull = scaled((alpha + w * z) / J if J > 0.0 else 0.0, g)
-            turning, along = sub(pull, scaled(third_p, x)), sub(scaled(w * J, n), scaled(third_p, g))
+            a = sub(scaled((alpha + w * z) / J if J > 0.0 else 0.0, g), scaled(third_p, x))
+            b = sub(scaled(w * J, n), scaled(third_p, g))
             for i in range(len(nodes)):
-                force = add(cross(turning, _across(shapes, q, i, u, v)), scaled(shapes.value[q, i], along))
+                force = add(cross(a, _across(shapes, q, i, u, v)), scaled(shapes.value[q, i], b))
                 accumulate(out, nodes[i], scaled(dA, force))
+
+
+@inlined
+def _changes(
+    T: float, third_p: float, w: float, n: Vector, g: Vector, d: Vector, dg: Vector
+) -> tuple[Vector, Vector]:
+    """δa and δb."""
+    J = norm(g)
+    nu = scaled(1.0 / J, g)
+    dJ = dot(nu, dg)
+    da = add(scaled(T / J, sub(dg, scaled(dJ, nu))), scaled(w * dot(n, d), nu))
+    return sub(da, scaled(third_p, d)), sub(scaled(w * dJ, n), scaled(third_p, dg))
 
 
 @compiled
@@ -87,20 +101,16 @@ def add_element_products(mesh: Mesh, X: Floats, D: Floats, change: Floats) -> No
         for q in range(len(shapes.weight)):
             place, (u, v) = _interpolated(X, nodes, shapes.value[q]), _tangents(X, nodes, shapes, q)
             d, (du, dv) = _interpolated(D, nodes, shapes.value[q]), _tangents(D, nodes, shapes, q)
-            g, dg = cross(u, v), cross_sum(du, v, u, dv)
+            g, T = cross(u, v), alpha + w * dot(sub(place, ground), n)
             J = norm(g)
             if J == 0.0:
                 continue
-            nu, x, dA = scaled(1.0 / J, g), sub(place, origin), shapes.weight[q]
-            dJ, T = dot(nu, dg), alpha + w * dot(sub(place, ground), n)
-            turning = sub(scaled(T, nu), scaled(third_p, x))
-            turned = add(scaled(T / J, sub(dg, scaled(dJ, nu))), scaled(w * dot(n, d), nu))
-            turned = sub(turned, scaled(third_p, d))
-            along = sub(scaled(w * dJ, n), scaled(third_p, dg))
+            a = sub(scaled(T / J, g), scaled(third_p, sub(place, origin)))
+            da, db = _changes(T, third_p, w, n, g, d, cross_sum(du, v, u, dv))
             for i in range(len(nodes)):
                 m, dm = _across(shapes, q, i, u, v), _across(shapes, q, i, du, dv)
-                force = add(cross_sum(turned, m, turning, dm), scaled(shapes.value[q, i], along))
-                accumulate(change, nodes[i], scaled(dA, force))
+                force = add(cross_sum(da, m, a, dm), scaled(shapes.value[q, i], db))
+                accumulate(change, nodes[i], scaled(shapes.weight[q], force))
 
 
 @compiled
@@ -108,40 +118,25 @@ def fill_block(mesh: Mesh, X: Floats, e: int, hessian: float, stiffness: float, 
     """Write hessian · ∂²E + stiffness · L of element e into block (k,k,3,3), where j ≥ i."""
     shapes, origin, ground, n = mesh.shapes, vector(mesh.origin), vector(mesh.ground), vector(mesh.normal)
     nodes, k = mesh.faces[e], mesh.patch[e]
-    alpha, third_p, w = mesh.tension[k], hessian * mesh.pressure[k] / 3.0, mesh.weight[k]
+    alpha, third_p, w = mesh.tension[k], mesh.pressure[k] / 3.0, mesh.weight[k]
     m, size = np.empty((len(nodes), 3)), len(nodes)
     block[:] = 0.0
     for q in range(len(shapes.weight)):
         N, Nu, Nv, dA = shapes.value[q], shapes.along_u[q], shapes.along_v[q], shapes.weight[q]
         place, (u, v) = _interpolated(X, nodes, N), _tangents(X, nodes, shapes, q)
-        g = cross(u, v)
-        J = norm(g)
+        g, extra = cross(u, v), w * dot(sub(place, ground), n)
+        J, T = norm(g), alpha + extra
         if J == 0.0:
             continue
-        nu, extra = scaled(1.0 / J, g), w * dot(sub(place, ground), n)
-        T, soft = dA * hessian * (alpha + extra), dA * stiffness * (alpha + max(extra, 0.0)) / J
-        turning = sub(scaled(T, nu), scaled(dA * third_p, sub(place, origin)))
-        for i in range(size):
-            m[i] = _across(shapes, q, i, u, v)
-        for i in range(size):
-            for j in range(i, size):
-                inner = dot(point(m, i), point(m, j))
-                s, rigid, twist = T / J * inner, soft * inner, Nv[i] * Nu[j] - Nu[i] * Nv[j]
-                mixed = sub(scaled(N[j], point(m, i)), scaled(N[i], point(m, j)))
-                x, y, z = add(scaled(twist, turning), scaled(dA * third_p, mixed))
-                B = block[i, j]
-                B[0, 0] += s * nu[0] * nu[0] + rigid
-                B[1, 1] += s * nu[1] * nu[1] + rigid
-                B[2, 2] += s * nu[2] * nu[2] + rigid
-                B[0, 1] += s * nu[0] * nu[1] - z
-                B[1, 0] += s * nu[0] * nu[1] + z
-                B[0, 2] += s * nu[0] * nu[2] + y
-                B[2, 0] += s * nu[0] * nu[2] - y
-                B[1, 2] += s * nu[1] * nu[2] - x
-                B[2, 1] += s * nu[1] * nu[2] + x
-                if w != 0.0:
-                    down = dA * hessian * w
-                    tilt, lean = cross(nu, point(m, i)), cross(nu, point(m, j))
-                    for r in range(3):
-                        for c in range(3):
-                            B[r, c] += down * (N[j] * tilt[r] * n[c] + N[i] * n[r] * lean[c])
+        a = sub(scaled(T / J, g), scaled(third_p, sub(place, origin)))
+        for j in range(size):
+            m[j] = _across(shapes, q, j, u, v)
+            for c in range(3):
+                unit = UNITS[c]
+                da, db = _changes(T, third_p, w, n, g, scaled(N[j], unit), cross(point(m, j), unit))
+                for i in range(j + 1):
+                    dm = scaled(Nv[i] * Nu[j] - Nu[i] * Nv[j], unit)
+                    force = add(cross_sum(da, point(m, i), a, dm), scaled(N[i], db))
+                    accumulate(block[i, j].T, c, scaled(dA * hessian, force))
+                    soft = (alpha + max(extra, 0.0)) / J * dot(point(m, i), point(m, j))
+                    block[i, j, c, c] += dA * stiffness * soft

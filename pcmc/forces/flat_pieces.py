@@ -145,12 +145,10 @@ def _seam_pieces(surface: Surface) -> FlatPieces:
         text = "a pressure that does not cancel at a free edge of a periodic surface; fix that edge, let it"
         raise SurfaceError(f"{text} slide on the plane, or take the pressure away", what="images")
     shift = surface.vertices[F] - surface.vertices[topo.faces]
-    start, end = shift[:, [1, 2, 0]], shift[:, [2, 0, 1]]  # of the sides opposite the corners
-    ascends = (topo.sense > 0)[..., None]
-    first = np.unique(topo.edge_of_face, return_index=True)[1]
-    low, high = (np.where(ascends, *ends).reshape(-1, 3)[first] for ends in ((start, end), (end, start)))
-    low, high = low[topo.edge_of_face], high[topo.edge_of_face]
-    at_start, at_end = np.where(ascends, low, high), np.where(ascends, high, low)
+    start = shift[:, [1, 2, 0]]  # of the sides opposite the corners
+    of_edges = (surface.vertices[topo.sides] - surface.vertices[topo.edges])[topo.edge_of_face]
+    ascends = (topo.sense > 0)[..., None, None]
+    at_start, at_end = np.moveaxis(np.where(ascends, of_edges, of_edges[:, :, ::-1]), 2, 0)
     apex, tiny = start - at_start, ON * surface.size
     face, opposite = np.nonzero(np.linalg.norm(apex, axis=2) > tiny)
     normal = -np.cross(at_end[:, [1, 2, 0]] - at_start[:, [2, 0, 1]], shift) / 6.0

@@ -16,13 +16,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, hand_over, kept_with_owner
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import NO_CHANGE, ON, SAME_PRESSURE
 from ..surface import Line, Surface, expect_surface
-from ..surface.geometry import area_vectors, edge_vectors, segment_lengths
+from ..surface.geometry import segment_lengths
 from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.parts import Room
@@ -31,11 +30,7 @@ from ..surface.supports import apply_supports, members
 from ..surface.topology import components
 from .functional import energy, patch_volumes, weighted
 
-SAMPLES = 12  # places along each side of a cell
-MOST_FACES = 4000  # of a room, among which the nearest is sought
-NEAREST = 16  # parts of triangles that are looked at for each place
-MOST_CUTS = 4  # of a triangle
-CLEAR = 0.3  # of a sixth of the cell: how far the places may be off
+CLEAR = 0.01  # of a sixth of a cell: beyond that a volume is no whole number of them
 
 
 def room_volumes(surface: Surface, X: Floats | None = None) -> Floats:
@@ -93,8 +88,10 @@ def pressure_shares(surface: Surface) -> Floats:
 
     A wall has the difference to the air beyond it. It counts only where rooms have nothing else.
     """
+    if not surface.rooms:  # numpy 2.1 refuses no rows
+        return surface.room_signs
     signs = surface.room_signs * surface.roof
-    whole = not surface.rooms or np.linalg.matrix_rank(signs) == len(signs)  # numpy 2.1 refuses no rows
+    whole = np.linalg.matrix_rank(signs) == len(signs)
     return np.asarray(np.linalg.pinv((signs if whole else surface.room_signs).T), dtype=np.float64)
 
 
@@ -187,43 +184,31 @@ def closing_volumes(surface: Surface) -> Floats:
 def _whole_sixths(surface: Surface) -> Floats:
     """(r,) what cones and pieces leave out of the volumes where a cell is periodic in three directions.
 
-    It is a whole number of sixths of the cell, by which vertices stand for their images alone. Places all
-    over the cell tell it: how many are inside a room, on the inner side of its triangle that is nearest.
+    It is a whole number of sixths of the cell, by which vertices stand for their images alone. In coordinates
+    x, y, z along the lattice a room has the volume, but for whole cells,
+
+        Σ_T ∫ x dy dz - Σ_e m (∫ y dz - k_b z_b + k_a z_a)
+
+    over its triangles, each in one piece, and its edges from a to b. Over an edge x jumps by the whole number
+    m from triangle to triangle; at its ends y differs from those of the vertices a and b by k_a and k_b.
     """
-    T = lattice_of(surface)
-    sixth = abs(float(np.linalg.det(T))) / 6.0
-    grid = np.stack(np.meshgrid(*[(np.arange(SAMPLES) + 0.37) / SAMPLES] * 3, indexing="ij"), axis=-1)
-    places, shifts = grid.reshape(-1, 3) @ T, np.argwhere(np.ones((3, 3, 3))) - 1.0
-    reached = surface.room_signs @ patch_volumes(surface)
-    found, fine = np.zeros(len(surface.rooms)), float(np.cbrt(6.0 * sixth)) / SAMPLES
-    for r, signs in enumerate(surface.room_signs):
-        own = np.flatnonzero(signs[surface.patch_of_face])
-        own = own[:: 1 + len(own) // MOST_FACES]
-        into = signs[surface.patch_of_face[own]] < 0.0
-        corners = surface.vertices[surface.faces[own]]
-        corners = np.where(into[:, None, None], corners[:, ::-1], corners)
-        for _ in range(MOST_CUTS):  # 1→4: the middle of a large triangle says little of what is near to it
-            long = np.linalg.norm(edge_vectors(corners), axis=2).max(axis=1) > fine
-            large = corners[long]
-            middle = 0.5 * (large + np.roll(large, -1, axis=1))
-            ends = [np.stack([large[:, k], middle[:, k], middle[:, k - 1]], axis=1) for k in range(3)]
-            corners = np.concatenate([corners[~long], *ends, middle])
-        out, middle = area_vectors(corners), corners.mean(axis=1)
-        middle -= np.floor(middle @ np.linalg.inv(T)) @ T
-        every = (middle + (shifts @ T)[:, None]).reshape(-1, 3)
-        distance, near = map(np.asarray, cKDTree(every).query(places, NEAREST))
-        out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
-        height = np.einsum("ikj,ikj->ik", places[:, None] - every[near], out[near % len(out)])
-        # beyond a sharp edge the sheets at it are as near; the one that it faces most knows the side
-        facing = np.where(distance <= distance[:, :1] + fine, np.abs(height) / distance, 0.0).argmax(axis=1)
-        inside = height[np.arange(len(places)), facing] < 0.0
-        found[r] = (inside.mean() * 6.0) - reached[r] / sixth
-    unclear = np.flatnonzero(np.abs(found - np.round(found)) > CLEAR)
-    if len(unclear):
-        name = surface.rooms[unclear[0]].name
-        text = f"room {name!r}: the mesh is too coarse to tell which side of its patches lies in it; refine"
-        raise SurfaceError(f"{text} it, and check their signs", what="rooms", where=name)
-    return np.asarray(np.round(found) * sixth)
+    T, topo = lattice_of(surface), surface.topology
+    X = (surface.vertices - surface.origin) @ np.linalg.inv(T)
+    corners, ends, vertices, edge = X[surface.faces], X[topo.sides], X[topo.edges], topo.edge_of_face
+    x, (_, y, z) = corners[..., 0], np.moveaxis(corners - corners[:, :1], 2, 0)
+    volume = 0.5 * x.mean(axis=1) * (y[:, 1] * z[:, 2] - y[:, 2] * z[:, 1])
+    k = np.rint(ends - vertices)[..., 1]
+    along = ends[..., 1].mean(axis=1) * np.diff(ends[..., 2])[:, 0] - np.diff(k * vertices[..., 2])[:, 0]
+    start = np.where(topo.sense > 0, x[:, [1, 2, 0]], x[:, [2, 0, 1]])
+    volume -= (topo.sense * np.rint(start - ends[edge, 0, 0]) * along[edge]).sum(axis=1)
+    of_patch, cell = np.bincount(surface.patch_of_face, volume, len(surface.patches)), np.linalg.det(T)
+    share, reached = (surface.room_signs @ of for of in (np.sign(cell) * of_patch, patch_volumes(surface)))
+    sixths = 6.0 * (share % 1.0 - reached / abs(cell))
+    for room, off in zip(surface.rooms, np.abs(sixths - np.round(sixths)), strict=True):
+        if off > CLEAR:
+            text = f"room {room.name!r}: its patches end along held edges; in a cell that goes on in three"
+            raise SurfaceError(f"{text} directions name all that close it", what="rooms", where=room.name)
+    return np.asarray(np.round(sixths) * abs(cell) / 6.0)
 
 
 def _left_over(surface: Surface, signs: Floats) -> Floats:

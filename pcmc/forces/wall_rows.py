@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..surface.checks import lying
 from ..surface.geometry import area_vectors, vertex_sums
 from ..surface.images import expect_no_images
 from ..surface.supports import Admissible, members
+from ..surface.topology import curve_neighbours
 
 SNAP = 1e-3  # of a top edge: a vertex this near to the line below a top vertex belongs on that line
 SAMPLES = 65  # points on each line from a foot to its top, to find the line that is nearest to a vertex
@@ -255,24 +257,26 @@ class Walls:
         held[self.wall_below[(self.foot[self.top_edges] >= 0).all(axis=1)]] = True
         return self.pinchable & ~held
 
+    @cached_property
+    def _over_bottom(self) -> tuple[Ints, Ints]:
+        """The vertices (k,) between two top edges over a held bottom, and the other ends (k,2) of these."""
+        edges = self.top_edges[(self.foot[self.top_edges] >= 0).all(axis=1)]
+        return curve_neighbours(np.concatenate([edges, edges[:, ::-1]]), len(self.foot))
+
     def across_bottom(self, vectors: Floats, X: Floats) -> Floats:
         """The part (n,3) of vectors across the held bottom below each top vertex, as its supports allow it.
 
         At an end of a bottom, and where walls meet, they alone say which part; X and vectors are (n,3)."""
-        chord, first = np.zeros_like(X), np.zeros_like(X)
-        edges = self.top_edges[(self.foot[self.top_edges] >= 0).all(axis=1)]
-        start, end = X[self.foot[edges.T]]
-        side = end - start
-        side /= np.linalg.norm(side, axis=1)[:, None]
-        # the two edges at a vertex may run either way, so sum their directions with the sign of the first
-        first[edges[:, 1]], first[edges[:, 0]] = side, side
-        for v in edges.T:
-            sign = np.where(np.einsum("ij,ij->i", first[v], side) < 0.0, -1.0, 1.0)
-            np.add.at(chord, v, sign[:, None] * side)
-        chord[np.bincount(edges.ravel(), minlength=len(X)) != 2] = 0.0
+        vertices, beside = self._over_bottom
+        sides = X[self.foot[beside]] - X[self.foot[vertices]][:, None]
+        one, other = np.moveaxis(sides / np.linalg.norm(sides, axis=2)[..., None], 1, 0)
+        # the two may run either way: along the bottom they are alike
+        chord = one + np.where(np.einsum("ij,ij->i", one, other) < 0.0, -1.0, 1.0)[:, None] * other
         length = np.linalg.norm(chord, axis=1)[:, None]
-        tangent = np.divide(chord, length, out=np.zeros_like(X), where=length > 0.0)
-        return self.admissible.part(vectors - np.einsum("ij,ij->i", tangent, vectors)[:, None] * tangent)
+        tangent = np.divide(chord, length, out=np.zeros_like(chord), where=length > 0.0)
+        across = vectors.copy()
+        across[vertices] -= np.einsum("ij,ij->i", tangent, across[vertices])[:, None] * tangent
+        return self.admissible.part(across)
 
 
 def find_walls(surface: Surface, held: bool = False) -> Walls:

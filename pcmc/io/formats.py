@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 from ..base.arrays import Floats
 from ..base.errors import FileError, unknown
 from ..base.units import Units
-from ..surface import Surface
+from ..surface import HeldCurve, Surface
 from .georeference import Georeference
+
+LOST = ("order", "images")
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Format:
     separate: bool = False  # whether it has a mesh per patch, which cannot have triangles without area
     own: tuple[str, ...] = ()  # the parts that it holds in its own way; others are among the metadata
     bare: bool = False  # whether it holds nothing but triangles and names
-    loses: tuple[str, ...] = ("order", "images")  # the ``PARTS`` that it does not hold
+    loses: tuple[str, ...] = LOST  # the ``PARTS`` that it does not hold
     reads: bool = True  # whether pcmc reads it, too
     besides: tuple[str, ...] = ()  # what it holds besides the surface, as ``write`` takes it
     unit: str = ""  # of length, that the format prescribes; empty if a file may have any, or says none
@@ -71,6 +73,7 @@ ROOMS = "volumes of rooms (it has the pressures reached)"
 LINES = "lines or circles that vertices slide along (they are fixed in it)"
 
 ORDER = "its curved elements (it has the flat triangles that join their nodes)"
+BENT = "the curves that its edges were drawn on (finer meshes guess them)"
 IMAGES = "which vertices are images of others (it has the cell alone, with a boundary and without rooms)"
 
 
@@ -82,6 +85,10 @@ class FormatPart(NamedTuple):
     there: Callable[[Surface, Units], object]  # whether a surface, or its file, has it
 
 
+def _bent(held: HeldCurve) -> bool:
+    return any(len(piece.points) > 2 for piece in held.curve.pieces)
+
+
 PARTS = {
     "weights": FormatPart("weights", 4, lambda surface, _: surface.weights.any()),
     "snow": FormatPart("snow", 5, lambda surface, _: surface.snows.any()),
@@ -91,6 +98,7 @@ PARTS = {
     "rooms": FormatPart(ROOMS, 6, lambda surface, _: surface.rooms),
     "planes": FormatPart(PLANES, 6, lambda surface, _: surface.on_planes),
     "curves": FormatPart("", 7, lambda surface, _: surface.held_curves),
+    "bent curves": FormatPart(BENT, 7, lambda surface, _: any(map(_bent, surface.held_curves))),
     "order": FormatPart(ORDER, 9, lambda surface, _: surface.order > 1),
     "images": FormatPart(IMAGES, 10, lambda surface, _: surface.periodic),
     "unit": FormatPart("its unit {unit}", 1, lambda _, units: units),
@@ -98,9 +106,9 @@ PARTS = {
 TOLD = tuple(name for name, part in PARTS.items() if part.words)
 MODEL = ("members", "cable_areas")  # of a structural model
 OURS = ("support", "patch")
-EVOLVER = Format("evolver", shared=True, loses=("lines", "cable weights", "order", "images", "unit"))
+EVOLVER = Format("evolver", shared=True, loses=("lines", "cable weights", "bent curves", *LOST, "unit"))
 FORMATS = {
-    ".pcmc": Format("native", "both", certificate=True, shared=True, loses=()),
+    ".pcmc": Format("native", "both", certificate=True, shared=True, own=("curves",), loses=()),
     **dict.fromkeys((".fe", ".dmp"), EVOLVER),
     ".obj": Format("obj"),
     ".ply": Format("ply", "both", reserved=(*"xyz", *OURS, "vertex_indices")),

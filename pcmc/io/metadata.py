@@ -18,13 +18,17 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
-from ..base.errors import FileError
+from ..base.errors import FileError, SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..base.validate import names_from_file
-from ..surface import Cable, Circle, Line, Patch, Plane, Room, Surface
+from ..surface import Cable, Circle, HeldCurve, Line, Patch, Plane, Room, Surface
 from ..surface.colours import patch_colors
+from ..surface.curve_data import exact_curve, exact_data
 from ..surface.geometry import bounding_size
+from ..surface.held_curve import checked_curves
+from ..surface.topology import topology
 from .mesh_data import (
+    FIXED,
     FREE,
     ROUNDING,
     SLIDING,
@@ -37,8 +41,9 @@ from .mesh_data import (
 )
 
 DAMAGED = (ValueError, KeyError, TypeError, IndexError, AttributeError)
+CURVES_LOST = "the curves that edges were drawn on were left out"
 CHANGED = "the surface has changed since it was written"
-PARTS = ("cables", "rooms", "lines", "planes", "slides", "order", "images")
+PARTS = ("cables", "rooms", "lines", "planes", "slides", "curves", "order", "images")
 
 
 def metadata_text(
@@ -76,6 +81,9 @@ def metadata_text(
         "rooms": [astuple(room) for room in surface.rooms],
         "lines": [[astuple(guide), where(own)] for guide, own in guides if own.any()],
         "planes": [[astuple(plane), where(own)] for plane, own in planes if own.any()],
+        "curves": [
+            [exact_data(one.curve), where(one.vertices), one.at.tolist()] for one in surface.held_curves
+        ],
         "order": surface.order if surface.order > 1 else 0,
         "images": surface.images.tolist(),
         "slides": [where((given == kind) & (plain != kind)) for kind in (FREE, SLIDING)] if planes else (),
@@ -205,15 +213,28 @@ def with_parts(data: MeshData) -> MeshData:
                 if len(where) and (own := groups(where, off)) is not None:
                     support[np.isin(group, own)] = kind
         rooms = tuple(Room(*row) for row in parts.get("rooms", ()))
+        rows = [
+            (exact_curve(pieces), groups(where, CURVES_LOST, exact=True), np.array(at, dtype=np.float64))
+            for pieces, where, at in parts.get("curves", ())
+        ]
+        fixed = np.zeros(len(X), dtype=bool) if support is None else support == FIXED
+        number = keep.copy()
+        number[group[fixed]] = np.flatnonzero(fixed)  # of the vertices at a place the one that is held
+        curves = tuple(HeldCurve(curve, number[own], at) for curve, own, at in rows if own is not None)
         order = int(parts.get("order", 1))
         images = within(parts["images"], "images", len(X)) if parts.get("images") else data.images
         guides = tuple((Circle(*row) if len(row) == 3 else Line(*row), own) for row, own in lines)
         on_planes = () if off in lost else tuple((Plane(*row), own) for row, own in planes)
     except DAMAGED:
         raise _damaged(str(dict(parts))) from None
+    try:
+        topo = topology(data.faces, data.patch_of_face, len(X))
+        checked_curves(curves, X, topo, fixed, bounding_size(X))
+    except SurfaceError:
+        lost[CURVES_LOST], curves = None, ()
     notes = (*data.notes, *([f"{', '.join(lost)}: {CHANGED}"] if lost else []))
     found: dict[str, Any] = {"cables": tuple(cables), "rooms": rooms, "lines": guides, "planes": on_planes}
-    found |= {"order": order, "images": images}
+    found |= {"order": order, "images": images} | ({"curves": curves} if curves else {})
     return replace(data, vertices=X, support=support, notes=notes, **found)
 
 

@@ -19,7 +19,7 @@ from ..base.tolerances import ON
 from ..forces.functional import energy, patch_volumes
 from ..forces.rooms import prescribed_volumes
 from ..surface import Patch, Room, Surface
-from ..surface.geometry import area_vectors, edge_vectors, face_areas, segment_lengths
+from ..surface.geometry import area_vectors, edge_vectors, face_areas, segment_lengths, vertex_sums
 from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.supports import apply_supports
@@ -70,12 +70,12 @@ class Film:
         return f"{name[a]} and {name[c]} {when} meet, and {name[b]} and {name[d]}"
 
 
-def film_of(surface: Surface, patch: int) -> Film | None:
-    """The strip that a patch is; None for one of another shape, or without four different patches beside it.
+def film_of(surface: Surface, name: str) -> Film:
+    """The strip that a patch is; SurfaceError for another shape, or without four different patches beside it.
 
     A film with further sides at junctions, such as a wall below a roof, is a strip across the short ones.
     """
-    topo, original = surface.topology, surface.original
+    topo, original, patch = surface.topology, surface.original, surface.patch_index(name)
     curves = [curve for curve in topo.junctions if patch in curve.sheets]
     edges = [topo.sides[topo.edge_numbers(curve.pairs)] for curve in curves]
     lengths = [float(segment_lengths(surface.vertices, own).sum()) for own in edges]
@@ -90,7 +90,8 @@ def film_of(surface: Surface, patch: int) -> Film | None:
         if strip and surface.fixed[original[sorted(ends[i] & ends[j])]].all():
             found.append((sum(lengths[k] for k in rest), i, j))
     if not found:
-        return None
+        text = f"patch {name!r} is no film between two junctions with two other patches each, four in all;"
+        raise SurfaceError(f"{text} only the neighbours of a film can be swapped", what="patch", where=name)
     _, i, j = min(found)
     one, other = curves[i], curves[j]
     pairs, width = _across(surface, one, other)
@@ -105,26 +106,29 @@ def lattice_steps(lattice: Floats, vectors: Floats) -> Ints:
     return np.asarray(np.rint(vectors @ np.linalg.pinv(lattice)).astype(np.int64))
 
 
+def shortest(lattice: Floats, vectors: Floats) -> Floats:
+    """(…,3) the shortest of all vectors that differ from these (…,3) by translations of a lattice (d,3)."""
+    return np.asarray(vectors - lattice_steps(lattice, vectors) @ lattice)
+
+
 def _across(surface: Surface, one: EdgeCurve, other: EdgeCurve) -> tuple[Ints, float]:
     """(k,2) the vertices of two curves side by side, some of one several times; their mean distance."""
     X, lattice, count = surface.vertices, lattice_of(surface), max(len(one.vertices), len(other.vertices))
 
-    def apart(row: Ints) -> Floats:
-        step = X[row[:, 1]] - X[row[:, 0]]
-        return np.asarray(np.linalg.norm(step - lattice_steps(lattice, step) @ lattice, axis=1))
+    def sampled(v: Ints) -> Ints:
+        share = np.rint(np.linspace(0, len(v) - 1, count)).astype(int)
+        return v[np.arange(count) * len(v) // count if one.closed else share]
+
+    def apart(v: Ints, w: Ints | int) -> Floats:
+        return np.asarray(np.linalg.norm(shortest(lattice, X[v] - X[w]), axis=1))
 
     rows = []
     for way in (other.vertices, other.vertices[::-1]):
         if one.closed:
-            start = np.broadcast_to(one.vertices[0], len(way))
-            way = np.roll(way, -int(apart(np.stack([start, way], axis=1)).argmin()))
-        row = list[Ints]()
-        for v in (one.vertices, way):
-            ends = np.rint(np.linspace(0, len(v) - 1, count)).astype(int)
-            row.append(v[np.arange(count) * len(v) // count if one.closed else ends])
-        rows.append(np.stack(row, axis=1))
-    pairs = min(rows, key=lambda row: float(apart(row).sum()))
-    return pairs, float(apart(pairs).mean())
+            way = np.roll(way, -int(apart(way, one.vertices[0]).argmin()))
+        rows.append(np.stack([sampled(one.vertices), sampled(way)], axis=1))
+    pairs = min(rows, key=lambda row: float(apart(*row.T).sum()))
+    return pairs, float(apart(*pairs.T).mean())
 
 
 def _apart(surface: Surface, curve: EdgeCurve, one: int, other: int) -> Floats:
@@ -138,8 +142,8 @@ def _apart(surface: Surface, curve: EdgeCurve, one: int, other: int) -> Floats:
     return out
 
 
-def swap(surface: Surface, patch: str) -> Surface:
-    """The surface with other neighbours of a film between two junctions; not solved.
+def swap(surface: Surface, patch: str) -> tuple[Surface, str]:
+    """The surface with other neighbours of a film between two junctions, not solved; and in words who meets.
 
     The new film has the name, tension and weight of the old one. Its pressure, its snow and the rooms that
     it bounds follow from the sheets beside it. A roof over the film goes along: the patches at its sides
@@ -156,7 +160,7 @@ def swap(surface: Surface, patch: str) -> Surface:
     SurfaceError : the patch is no such film, its junctions end at different fixed places, or a cable ends
         on it.
     """
-    film, mesh, target = _collapsed(surface, patch)
+    film, mesh, target = collapsed(surface, patch)
     curve = target[film.pairs[:, 0]]
     curve = curve[np.sort(np.unique(curve, return_index=True)[1])]
     edges = np.stack([curve, np.roll(curve, -1)], axis=1)[: None if film.closed else -1]
@@ -166,7 +170,8 @@ def swap(surface: Surface, patch: str) -> Surface:
         del patches[film.patch]
         mesh = replace(mesh, patch=mesh.patch - (mesh.patch > film.patch))
         rooms = [_with_sign(room, patch, 0) for room in surface.rooms]
-        return _rebuilt(surface, mesh, target, patches, rooms)[0]
+        what = f"patch {patch!r} is gone, and the four beside it meet at one junction"
+        return _rebuilt(surface, mesh, target, patches, rooms)[0], what
     # along an edge the values of A, C and the new film cancel, each with the sense in which it runs there
     sense = [mesh.sense(mesh.at_edge(k, *edges[0]), *edges[0]) for k in film.one_side]
     values = np.array([surface.pressures, surface.snows, *surface.room_signs])[:, list(film.one_side)]
@@ -182,7 +187,7 @@ def swap(surface: Surface, patch: str) -> Surface:
         columns = round(wide * WIDTH)
         if columns <= 1:
             break
-    return changed
+    return changed, film.meeting(surface, "now")
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,38 +219,24 @@ class _Mesh:
         return 1 if corners[corners.index(a) - 2] == b else -1
 
 
-def can_vanish(surface: Surface, patch: str) -> bool:
-    """Whether ``swap`` takes the patch: a film that nothing holds open."""
-    try:
-        _collapsed(surface, patch)
-    except SurfaceError:
-        return False
-    return True
+def collapsed(surface: Surface, patch: str) -> tuple[Film, _Mesh, Ints]:
+    """The film of this name, the mesh once it has vanished, and the vertex (n,) that each one is then.
 
-
-def _collapsed(surface: Surface, patch: str) -> tuple[Film, _Mesh, Ints]:
-    """The film of this name, the mesh once it has vanished, and the vertex (n,) that each one is then."""
+    SurfaceError as of ``swap``: it is no film between two junctions, or something holds it open.
+    """
     expect_flat(surface.cell, "swap")
-    film = film_of(surface, surface.patch_index(patch))
-    if film is None:
-        text = f"patch {patch!r} is no film between two junctions with two other patches each, four in all;"
-        raise SurfaceError(f"{text} only the neighbours of a film can be swapped", what="patch", where=patch)
+    film = film_of(surface, patch)
     own = surface.faces[surface.patch_of_face == film.patch]
     if cables := [cable.name for cable in surface.cables if np.isin(cable.edges, own).any()]:
         text = f"cable {cables[0]!r} runs on or to patch {patch!r}, whose neighbours are to be swapped"
         raise SurfaceError(f"{text}; leave the cable out", what="cables", where=cables[0])
     target, X, supports = surface.original.copy(), surface.vertices.copy(), surface.support_columns.copy()
-    lattice, freedom = lattice_of(surface), surface.admissible.freedom
-
-    def near(vertex: int, others: Ints) -> Floats:
-        step = surface.vertices[others] - surface.vertices[vertex]
-        return np.asarray(step - lattice_steps(lattice, step) @ lattice)
-
+    lattice, freedom, Y = lattice_of(surface), surface.admissible.freedom, surface.vertices
     fewer = int(np.argmin([len(np.unique(column)) for column in film.pairs.T]))
     for vertex in np.unique(film.pairs[:, fewer]):
         both = np.append(vertex, film.pairs[film.pairs[:, fewer] == vertex, 1 - fewer])
         most_held = freedom[both] == freedom[both].min()
-        steps = near(vertex, both[most_held])
+        steps = shortest(lattice, Y[both[most_held]] - Y[vertex])
         if freedom[both].min() == 0 and np.ptp(steps, axis=0).max() > ON * surface.size:
             text = f"the junctions of patch {patch!r} are held at different places, so it cannot vanish;"
             raise SurfaceError(f"{text} let their ends slide", what="patch", where=patch)
@@ -253,9 +244,8 @@ def _collapsed(surface: Surface, patch: str) -> tuple[Film, _Mesh, Ints]:
         target[both] = vertex
     ends = film.pairs[[0, -1], fewer]
     for vertex in np.setdiff1d(surface.original[own], film.pairs):  # of its short sides, where a roof goes on
-        target[vertex] = ends[np.linalg.norm(near(vertex, ends), axis=1).argmin()]
-    target = target[surface.original]
-    F, Y = surface.original[surface.faces], surface.vertices
+        target[vertex] = ends[np.linalg.norm(shortest(lattice, Y[ends] - Y[vertex]), axis=1).argmin()]
+    target, F = target[surface.original], surface.original[surface.faces]
     counts = lattice_steps(lattice, Y[surface.faces] - Y[F]) + lattice_steps(lattice, Y - Y[target])[F]
     V, left = target[F], surface.patch_of_face != film.patch
     left &= (V[:, [1, 2, 0]] != V).all(axis=1)
@@ -264,19 +254,15 @@ def _collapsed(surface: Surface, patch: str) -> tuple[Film, _Mesh, Ints]:
 
 def _opening(surface: Surface, film: Film, mesh: _Mesh, edges: Ints) -> Floats | None:
     """(n,3) the unit vectors along which the curve opens towards A and C; None where it stays closed."""
-    at, lattice, beside = mask_of(edges, len(mesh.X)), lattice_of(surface), mesh.beside(film, edges)
-    P, patch = mesh.corners(surface)[beside], mesh.patch[beside]
-    normal, area = area_vectors(P), face_areas(P)
-    weight = 0.5 * surface.tensions[patch] / np.where(area > 0.0, area, 1.0)
-    pull = np.zeros((len(surface.patches), *mesh.X.shape))  # of each sheet, - α ∂A/∂x, (15a)
-    corner_pull = weight[:, None, None] * np.cross(edge_vectors(P), normal[:, None])
-    np.add.at(pull, (patch[:, None], mesh.vertices[beside]), corner_pull)
-    (a, c), (b, d) = film.one_side, film.other_side
-    new, old = 0.5 * (pull[a] + pull[c] - pull[b] - pull[d]), 0.5 * (pull[a] + pull[b] - pull[c] - pull[d])
+    at, beside = mask_of(edges, len(mesh.X)), mesh.beside(film, edges)
+    P, V, patch = mesh.corners(surface)[beside], mesh.vertices[beside], mesh.patch[beside]
+    normal = area_vectors(P) / np.maximum(face_areas(P), 1e-300)[:, None]
+    pull = 0.25 * surface.tensions[patch, None, None] * np.cross(edge_vectors(P), normal[:, None])  # (15a)
+    sides = (np.isin(patch, pair)[:, None, None] for pair in (film.one_side, film.sheets[::2]))  # A, C; A, B
+    new, old = (vertex_sums(np.where(side, pull, -pull), V, len(at)) for side in sides)
     guided = mesh.supports[:, 2 + len(surface.on_planes) :].any(axis=1)
     at &= ~mesh.supports[:, 0] | guided  # a fixed end stays one
-    span = mesh.X[edges[:, 1]] - mesh.X[edges[:, 0]]
-    span -= lattice_steps(lattice, span) @ lattice
+    span = shortest(lattice_of(surface), mesh.X[edges[:, 1]] - mesh.X[edges[:, 0]])
     lengths = np.bincount(edges.ravel(), np.repeat(0.5 * np.linalg.norm(span, axis=1), 2), len(at))
     strength, other = np.linalg.norm([new, old], axis=2)
     if max(strength[at].sum(), other[at].sum()) <= surface.tensions[film.patch] * lengths[at].sum():

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from ..base import validate
-from ..base.arrays import Bools, Floats, Ints
+from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import ON
 from ..surface.geometry import angles, bounding_size, cross_2d, file_origin, segment_lengths, vertex_sums
@@ -146,10 +146,12 @@ def _inside(points: Floats, segments: Ints, holes: Floats, k: int, origin: Float
         raise SurfaceError("the points lie on one line and enclose no area", what="points") from None
     area = signed_areas(points, T)
     T[area < 0] = T[area < 0][:, ::-1]
-    for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0]:
-        T = _with_segment(points, T, int(a), int(b), origin)
-    for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0].tolist():
-        raise _crossing(points + origin, a, b)
+    missing = segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0].tolist()
+    for a, b in missing:
+        T = _with_segment(points, T, a, b, origin)
+    if missing:  # one put in may have taken another away
+        for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0].tolist():
+            raise _crossing(points + origin, a, b)
     sides = T[:, SIDES].reshape(-1, 2)
     free = edge_places(sides, segments) < 0
     pairs = twins(sides.min(axis=1) * len(points) + sides.max(axis=1))
@@ -164,16 +166,18 @@ def _inside(points: Floats, segments: Ints, holes: Floats, k: int, origin: Float
     kept = ~np.isin(part, [*outer, *part[located]])
     if not kept.any():
         raise SurfaceError("the segments enclose no area; close the outline", what="segments")
-    used = np.union1d(np.arange(k), T[kept])
+    used = mask_of(T[kept], len(points))
+    used[:k] = True
     region = np.unique(part[kept], return_inverse=True)[1]
-    return PlanarMesh(points[used], np.searchsorted(used, T[kept]), region)
+    return PlanarMesh(points[used], (np.cumsum(used) - 1)[T[kept]], region)
 
 
 def twins(key: Ints) -> Ints:
     """(k,2) the places of each key that occurs exactly twice."""
     order = np.argsort(key, kind="stable")
-    _, first, count = np.unique(key[order], return_index=True, return_counts=True)
-    return order[np.stack([first[count == 2], first[count == 2] + 1], axis=1)]
+    ends = np.flatnonzero(np.diff(key[order], prepend=np.nan, append=np.nan))  # NaN is no key
+    first = ends[:-1][np.diff(ends) == 2]
+    return order[np.stack([first, first + 1], axis=1)]
 
 
 def _crossing(X: Floats, a: int, b: int) -> SurfaceError:

@@ -51,8 +51,7 @@ class Plan:
     plane : Π. Points [x, y] are on it, from its point, along the x axis laid on it and across; points
         [x, y, z] are in space.
     rise : height of the initial surface above the one that the boundary spans, length; by default
-        0.3 of the radius of the largest circle without supports. In a project without tensions it is the
-        height wanted over the outline, for which the tension is found.
+        0.3 of the radius of the largest circle without supports.
     points : points [x, y] by name; each becomes a vertex, or names the support there; targets can name it.
     tension : α of all patches, instead of ``patches``, force/length.
     pressure, weight : of all patches, with ``tension``: force per area along the normal, and per area against

@@ -201,8 +201,8 @@ def equilibria(
     names = [line.name for line in found.lines]
     line = found.lines[names.index(validate.choice("along", along or names[0], names))] if names else None
     shown = found.found[:MOST_PICTURES]
-    columns = min(COLUMNS, len(shown))
-    rows = -(-len(shown) // columns)
+    columns = max(1, min(COLUMNS, len(shown)))
+    rows = max(1, -(-len(shown) // columns))
     figure = new(width, (0.45 * width if line else 0.0) + 0.26 * width * rows, pad=8.0)
     heights = [*([2.0] * (line is not None)), *([1.0] * rows)]
     places = figure.add_gridspec(len(heights), columns, height_ratios=heights)

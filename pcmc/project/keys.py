@@ -16,7 +16,7 @@ from ..base.units import FORCES, LENGTHS
 from ..cloth.settings import CuttingOptions
 from ..design import Parameter, Target
 from ..design.targets import KINDS as KINDS_OF_PARAMETER
-from ..design.targets import MEASURES, SHORT
+from ..design.targets import MEASURES
 from ..io.georeference import Georeference
 from ..plan import CableLine, Divider, Hole, PatchSpec, Plan
 from ..plan.parts import BALANCED, WALL, RoomData
@@ -213,8 +213,9 @@ def main_sections() -> tuple[Section, ...]:
     outline, *others = _of_class(Plan)
     plan = [replace(outline, unless=("drawing",)), Key("drawing", "a text", None, drawing)]
     plan += [Key("gap", "a number", None, gap)]
+    others = [key for key in others if key.name != "rise"]  # of the initial surface
     plan += [replace(key, default=None) if key.name == "edge_length" else key for key in others]
-    plan += _rise_keys("instead of a tension: for the whole roof", WHOLE_RISES[1:])
+    plan += _rise_keys("instead of a tension: for the whole roof", WHOLE_RISES)
     specs = [key for key in _of_class(PatchSpec) if key.name != "name"]
     patch = [replace(key, unless=RISES) if key.name == "tension" else key for key in specs]
     patch += _rise_keys("instead of a tension, which is found")
@@ -282,7 +283,7 @@ def solve_section(method: str) -> Section:
 @cache
 def target_sections() -> tuple[Section, ...]:
     """[targets] and its tables."""
-    wanted = _of_class(Target, quantity=(*MEASURES, *SHORT), of="a name or a point [x, y]")
+    wanted = _of_class(Target, quantity=tuple(MEASURES), of="a name or a point [x, y]")
     changing = _of_class(Parameter, patch="a name or a list of names", kind=KINDS_OF_PARAMETER)
     meet = Key("meet", "a list of tables", REQUIRED, "the quantities and their values")
     vary = Key("vary", "a list of names, lists of names, or tables", REQUIRED, VARIED)

@@ -10,7 +10,7 @@ from ..base import validate
 from ..base.errors import SurfaceError
 from ..certificate.diagnosis import vanished_films
 from ..forces.rooms import energy_at_volumes
-from ..meshing.neighbour_swap import film_of, swap
+from ..meshing.neighbour_swap import swap
 from ..surface import Surface, expect_surface
 from ..surface.parts import listed
 from . import solve
@@ -88,12 +88,8 @@ def swap_neighbours(
         raise SurfaceError(text, what="patches")
     changed, sentences = surface, []
     for name in names:
-        before, film = changed, film_of(changed, changed.patch_index(name))
-        changed = swap(before, name)
-        if len(changed.patches) < len(before.patches):
-            sentences.append(f"patch {name!r} is gone, and the four beside it meet at one junction")
-        elif film:
-            sentences.append(film.meeting(before, "now"))
+        changed, what = swap(changed, name)
+        sentences.append(what)
     result = solve(changed, **options)
     if result.converged:
         now, then = energy_at_volumes(result.surface), energy_at_volumes(surface)

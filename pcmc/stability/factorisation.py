@@ -7,14 +7,15 @@ does the symbolic work once per pattern; ``factor`` then takes new values. Backe
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
 import math
 import os
 import re
 import threading
 import weakref
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import metadata
@@ -22,7 +23,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csc_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
@@ -38,6 +39,7 @@ Linear = Callable[[Floats], Floats]
 """A linear map, such as A⁻¹, of one vector (N,) or several (N,k)."""
 TINY = float(np.finfo(float).tiny)
 ONE_THREAD = 10_000  # rows; up to here MKL is fastest with one thread
+ONE, SYMMETRIC, SILENT = (ctypes.byref(ctypes.c_int32(number)) for number in (1, -2, 0))
 
 IPARM = {  # MKL's parameters by their numbers from 1
     1: 1,  # the values below instead of the defaults
@@ -174,18 +176,9 @@ class _Pardiso:
     """MKL PARDISO on the upper triangle: mtype -2, real symmetric indefinite."""
 
     def __init__(self, pattern: Pattern) -> None:
-        # without this variable pypardiso searches the whole prefix for MKL, 0.2 s each time
-        if path := _mkl_path():
-            os.environ.setdefault("PYPARDISO_MKL_RT", path)
-        import pypardiso
-
         self._pattern = pattern
-        self._solver = pypardiso.PyPardisoSolver(mtype=-2)
-        os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
-        self._error = pypardiso.pardiso_wrapper.PyPardisoError
+        self._memory = _Memory(pattern)
         self._lock = threading.Lock()
-        for number, value in IPARM.items():
-            self._solver.set_iparm(number, value)
         self._analysed = False
         self._made = 0  # factorisations so far: MKL keeps the last one only
 
@@ -193,46 +186,75 @@ class _Pardiso:
         _finite(data)
         # scaled to entries below 1: MKL compares pivots with a fixed number
         unit = 0.5 ** math.frexp(np.abs(data).max(initial=TINY))[1]
-        matrix = self._pattern.matrix(unit * data)
-        nothing = np.zeros((self._pattern.size, 1), order="F")
+        data = unit * data
+        nothing = np.zeros(self._pattern.size)
         self._made += 1
         made = self._made
-        try:
-            if not self._analysed:
-                self._run(11, matrix, nothing)
-                self._analysed = True
-                # the factor is memory of MKL's: freed with this object, not at exit
-                weakref.finalize(self, _release, self._solver, self._pattern).atexit = False
-            self._run(22, matrix, nothing)
-        except self._error as error:
-            raise SingularMatrix(str(error)) from None
-        iparm = self._solver.iparm
-        if iparm[13]:  # the number of pivots that MKL has replaced
-            raise SingularMatrix(f"{iparm[13]} pivots are zero to rounding")
-        negative = int(iparm[22])
-        return Factor(
-            lambda right: self._run(33, matrix, np.asfortranarray(unit * right), made), lambda: negative
-        )
+        if not self._analysed:
+            self._run(11, data, nothing)
+            self._analysed = True
+            # the factor is memory of MKL's: freed with this object, not at exit
+            weakref.finalize(self, self._memory.run, -1, np.zeros_like(data), nothing).atexit = False
+        self._run(22, data, nothing)
+        if replaced := self._memory.iparm[13]:
+            raise SingularMatrix(f"{replaced} pivots are zero to rounding")
+        negative = int(self._memory.iparm[22])
+        return Factor(lambda right: self._run(33, data, unit * right, made), lambda: negative)
 
-    def _run(self, phase: int, matrix: csr_array, right: Floats, made: int | None = None) -> Floats:
-        """A phase of MKL's; where it uses a factor, the ``made``-th one."""
-        with self._lock, self._threads():
+    def _run(self, phase: int, data: Floats, right: Floats, made: int | None = None) -> Floats:
+        """A phase of MKL's, on one thread if the matrix is small; where it uses a factor, the ``made``-th."""
+        set_threads = _mkl().MKL_Set_Num_Threads_Local
+        with self._lock:
             if made not in (None, self._made):
                 text = "this factorisation is out of date: its factoriser has made another one since;"
                 raise PcmcError(f"{text} factorise its matrix again, or use a factoriser for each")
-            self._solver.set_phase(phase)
-            return self._solver._call_pardiso(matrix, right)
+            before = set_threads(1) if self._pattern.size <= ONE_THREAD else None
+            try:
+                return self._memory.run(phase, data, right)
+            finally:
+                if before is not None:
+                    set_threads(before)
 
-    @contextmanager
-    def _threads(self) -> Iterator[None]:
-        """MKL uses one thread within the block if the matrix is small."""
-        set_threads = self._solver.libmkl.MKL_Set_Num_Threads_Local
-        before = set_threads(1) if self._pattern.size <= ONE_THREAD else None
-        try:
-            yield
-        finally:
-            if before is not None:
-                set_threads(before)
+
+class _Memory:
+    """What PARDISO keeps of one pattern; pypardiso itself would copy the pattern for each solution."""
+
+    def __init__(self, pattern: Pattern) -> None:
+        self.iparm = np.zeros(64, dtype=np.int32)
+        self.iparm[[number - 1 for number in IPARM]] = list(IPARM.values())
+        rows, columns = (part.astype(np.int32) + 1 for part in (pattern.indptr, pattern.indices))
+        self._arrays = np.zeros(64, dtype=np.int64), rows, columns, self.iparm
+        self._places = [_place(array) for array in self._arrays]
+        self._size = ctypes.byref(ctypes.c_int32(pattern.size))
+
+    def run(self, phase: int, data: Floats, right: Floats) -> Floats:
+        """A phase of MKL's with the upper triangle's values and right sides (N,) or (N,k)."""
+        right = np.asfortranarray(right)
+        out = np.zeros_like(right)
+        handle, rows, columns, iparm = self._places
+        step, sides, error = ctypes.c_int32(phase), ctypes.c_int32(right.size // len(right)), ctypes.c_int32()
+        _mkl().pardiso(
+            handle, ONE, ONE, SYMMETRIC, ctypes.byref(step), self._size, _place(data), rows, columns, None,
+            ctypes.byref(sides), iparm, SILENT, _place(right), _place(out), ctypes.byref(error),
+        )  # fmt: skip
+        if error.value:
+            raise SingularMatrix(f"MKL's PARDISO ended with its error {error.value}")
+        return np.ascontiguousarray(out)
+
+
+def _place(array: Floats | Ints) -> Any:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+@cache
+def _mkl() -> Any:
+    """MKL, loaded as pypardiso finds it."""
+    # without this variable it searches the whole prefix, 0.2 s each time
+    if path := _mkl_path():
+        os.environ.setdefault("PYPARDISO_MKL_RT", path)
+    import pypardiso
+
+    return ctypes.CDLL(pypardiso.PyPardisoSolver().libmkl._name)  # without its types of arguments
 
 
 @cache
@@ -244,8 +266,3 @@ def _mkl_path() -> str:
                 path = Path(str(file.locate()))
                 return str(path.resolve()) if path.is_file() else ""
     return ""
-
-
-def _release(solver: Any, pattern: Pattern) -> None:
-    solver.set_phase(-1)
-    solver._call_pardiso(pattern.matrix(np.zeros(len(pattern.indices))), np.zeros((pattern.size, 1)))

@@ -35,7 +35,7 @@ from scipy.sparse import block_array, coo_array, csr_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from ..base.arrays import Floats, Ints
-from ..surface.geometry import area_vectors, edge_vectors, unit_vectors
+from ..surface.geometry import area_vectors, edge_vectors, end_tangent, unit_vectors
 from ..surface.topology import components
 
 UPRIGHT = 1e-6  # sine of the angle to the upright below which a bar stands: its z is another direction
@@ -63,7 +63,7 @@ class BarFrame:
         u, held, _ = np.split(factor.solve(load), [6 * n, 6 * n + len(self.holds)])
         ends = np.einsum("bij,bjk,bk->bi", self._own, self._turn, u[self._place])
         reactions = -scale * (self.holds.T @ held).reshape(n, 6)
-        return FrameForces(u.reshape(n, 6)[:, :3], ends, reactions[:, :3], reactions[:, 3:])
+        return FrameForces(self, u.reshape(n, 6)[:, :3], ends, reactions[:, :3], reactions[:, 3:])
 
     def buckling(self, N: Floats) -> float:
         """The factor on forces N (b,) along the bars, tension above 0, at which these buckle, loads keeping
@@ -86,7 +86,7 @@ class BarFrame:
             bars, holds = mine[self.bars[:, 0]], self.holds[:, np.repeat(mine, 6)]
             ends, held = (np.cumsum(mine) - 1)[self.bars[bars]], holds[holds.any(axis=1)]
             return BarFrame(self.points[mine], ends, self.stiffness[bars], held, self.up).buckling(N[bars])
-        (EA, EI, across, _), L, n = self.stiffness.T, self._axes[1], 6 * len(self.points)
+        (EA, EI, across, _), L, n = self.stiffness.T, self.axes[1], 6 * len(self.points)
         bent = N / (30 * L)
         G = self._assembled(_blocks(L, 0.0 * N, bent, bent, N * (EI + across) / (EA * L), PULLED))
         factor = self._factor[0]
@@ -99,13 +99,14 @@ class BarFrame:
         return 1.0 / most if most > 1.0 / NEVER else np.inf
 
     @cached_property
-    def _axes(self) -> tuple[Floats, Floats]:
+    def axes(self) -> tuple[Floats, Floats]:
+        """(b,3,3) and (b,): ``bar_axes``."""
         return bar_axes(self.points, self.bars, self.up)
 
     @cached_property
     def _turn(self) -> Floats:
         """(b,12,12) from the coordinates of space to those of the bars."""
-        return np.einsum("pq,bij->bpiqj", np.eye(4), self._axes[0]).reshape(-1, 12, 12)
+        return np.einsum("pq,bij->bpiqj", np.eye(4), self.axes[0]).reshape(-1, 12, 12)
 
     @cached_property
     def _place(self) -> Ints:
@@ -115,7 +116,7 @@ class BarFrame:
     @cached_property
     def _own(self) -> Floats:
         """(b,12,12) the stiffness of bars in their axes."""
-        (EA, EI, across, GJ), L = self.stiffness.T, self._axes[1]
+        (EA, EI, across, GJ), L = self.stiffness.T, self.axes[1]
         return _blocks(L, EA / L, EI / L**3, across / L**3, GJ / L, BENDING)
 
     def _assembled(self, own: Floats) -> csr_array:
@@ -149,6 +150,7 @@ class BarFrame:
 class FrameForces:
     """What a frame does under its loads."""
 
+    frame: BarFrame
     displacements: Floats  # (n,3) length
     ends: Floats  # (b,12) forces and moments on the ends of each bar, in its axes
     reactions: Floats  # (n,3) forces of the supports on the frame
@@ -157,17 +159,26 @@ class FrameForces:
     def within(self, chain: Ints, closed: bool = False) -> Floats:
         """(k,6) along bars (c,), each from where the one before ends, at their k points: N, tension above 0;
         the shear forces upright and across; the torque; the moments upright, above 0 with tension below, and
-        across. V = dM/ds. Moments are those at the points; the other forces jump there, as loads do: the mean
-        is taken, and at ends the line through the two nearest bars."""
+        across. V = dM/ds. Moments are those at the points, about the bars' axes; the other forces jump there,
+        as loads do. Both are taken on the line between the middles of the two bars at a point; at ends forces
+        are on the line through the two nearest ones, and moments about the axes of the ``end_tangent``."""
         columns, signs = [0, 2, 1, 3, 4, 5], [1.0, -1.0, -1.0, 1.0, -1.0, 1.0]
         first, last = -self.ends[chain, :6][:, columns] * signs, self.ends[chain, 6:][:, columns] * signs
         middle, before, after = 0.5 * (first + last)[:, :4], last[:, 4:], first[:, 4:]
+        axes, length, flip = *(of[chain] for of in self.frame.axes), np.array(signs[3:])
         if closed:
             middle, before = np.vstack([middle[-1:], middle]), np.roll(before, 1, axis=0)
+            length = np.append(length[-1:], length)
         else:
             middle = np.pad(middle, ((1, 1), (0, 0)), mode="reflect", reflect_type="odd")
+            for at, moments, two in ((0, first[0, 3:], slice(2)), (-1, last[-1, 3:], slice(None, -3, -1))):
+                there = axes_along(end_tangent(axes[two, 0], length[two])[None], self.frame.up)[0]
+                moments[:] = flip * (there @ axes[at].T @ (flip * moments))
             before, after = np.vstack([after[:1], before]), np.vstack([after, before[-1:]])
-        return 0.5 * np.hstack([middle[:-1] + middle[1:], before + after])
+            length = np.pad(length, 1, mode="reflect")
+        share = (length[:-1] / (length[:-1] + length[1:]))[:, None]
+        before, after = np.hstack([middle[:-1], before]), np.hstack([middle[1:], after])
+        return before + share * (after - before)
 
 
 def bar_axes(X: Floats, bars: Ints, up: Floats) -> tuple[Floats, Floats]:
@@ -179,12 +190,20 @@ def bar_axes(X: Floats, bars: Ints, up: Floats) -> tuple[Floats, Floats]:
     """
     along = X[bars[:, 1]] - X[bars[:, 0]]
     length = np.linalg.norm(along, axis=1)
-    along = along / length[:, None]
+    return axes_along(along / length[:, None], up), length
+
+
+def axes_along(along: Floats, up: Floats) -> Floats:
+    """(b,3,3) rows: directions (b,3), across, upright; all of length 1.
+
+    >>> axes_along(np.eye(3)[:1], np.eye(3)[2])[0].tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
     across = np.cross(up, along)
     stands = np.linalg.norm(across, axis=1) <= UPRIGHT
     across[stands] = np.cross(np.eye(3)[np.abs(up).argmin()], along[stands])
     across = unit_vectors(across)
-    return np.stack([along, across, np.cross(along, across)], axis=1), length
+    return np.stack([along, across, np.cross(along, across)], axis=1)
 
 
 def _blocks(L: Floats, along: Floats, up: Floats, across: Floats, twist: Floats, unit: Floats) -> Floats:

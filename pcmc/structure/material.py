@@ -147,11 +147,18 @@ class Profile:
 
     @property
     def torsion(self) -> float:
-        """J of the equal rectangle, length⁴: c a³ b with its shorter side a and c = 1/3 - 0.21 a/b
-        (1 - a⁴/12 b⁴), as in Roark's Formulas for Stress and Strain."""
-        *sides, factor = self.equal_rectangle
-        a, b = sorted(sides)
-        return factor * a**3 * b * (1.0 / 3.0 - 0.21 * a / b * (1.0 - (a / b) ** 4 / 12.0))
+        """J, length⁴: of a rectangle c a³ b with its shorter side a and c = 1/3 - 0.21 a/b (1 - a⁴/12 b⁴), as
+        in Roark's Formulas for Stress and Strain; of others 4 I I'/(I + I'), as of circles, tubes, ellipses.
+
+        >>> tube = Profile.tube(2.0, 0.1)
+        >>> tube.torsion == 2.0 * tube.upright
+        True
+        """
+        if self.shape == "rectangle":
+            a, b = sorted(self.sizes)
+            return a**3 * b * (1.0 / 3.0 - 0.21 * a / b * (1.0 - (a / b) ** 4 / 12.0))
+        up, side = self.moments
+        return 4.0 * up * side / (up + side)
 
 
 def _size(name: str, value: object) -> float:

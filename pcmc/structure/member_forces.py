@@ -17,7 +17,7 @@ from ..certificate.forces import Forces, cable_ends
 from ..certificate.supports import FORCE, support_table, support_vertices
 from ..forces.cables import directions, pull_along
 from ..forces.pinching import standing_part
-from ..surface.geometry import lengths_along, vertex_sums
+from ..surface.geometry import end_tangent, lengths_along, vertex_sums
 from .frames import BarFrame, balancing_force, corner_forces, turns
 from .loads import Step
 from .members import PlacedMember
@@ -168,11 +168,13 @@ def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:
     """By the vertices at fixed ends of beams, the turns (k,3) that are held there, as unit vectors at right
     angles: the twist of hinged ends on X (n,3), all of clamped ones."""
     given = dict[int, list[Floats]]()
-    for line in model.beams:
-        for v, beside in line.ends:
-            along = (X[beside] - X[v]) / np.linalg.norm(X[beside] - X[v])
+    for line in (line for line in model.beams if not line.closed):
+        t, length = directions(X, line.pairs)
+        for v, two in ((line.vertices[0], slice(2)), (line.vertices[-1], slice(None, -3, -1))):
             if model.held[v] and model.freedom[v] == 0:
-                given.setdefault(int(v), []).extend([along] if line.member.ends == "hinged" else np.eye(3))
+                clamped = line.member.ends == "clamped"
+                turns = np.eye(3) if clamped else end_tangent(t[two], length[two])[None]
+                given.setdefault(int(v), []).extend(turns)
     return {v: orth(np.array(held).T, ALIKE).T for v, held in given.items()}
 
 

@@ -11,11 +11,10 @@ from ..base.errors import SurfaceError
 from . import checks
 from .guides import Plane
 from .held_curve import checked_curves
-from .images import check_weights, checked_images, glued, originals
+from .images import check_weights, checked_images, glued
 from .lagrange import checked_order, element_nodes, sides_along
 from .parts import Patch, checked_cables, checked_rooms, named_parts
 from .supports import Supports, check_on, checked_lines, checked_planes
-from .topology import topology
 
 
 def checked_parts(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -41,7 +40,7 @@ def checked_parts(given: Mapping[str, Any]) -> dict[str, Any]:
     fixed, lines = checks.mask(given["fixed"], n, "fixed"), checked_lines(given["on_line"], X)
     supports = Supports(fixed, checks.mask(given["on_plane"], n, "on_plane"), lines)
     images = checked_images(given["images"], X, F, fixed, supports.on_plane)
-    topo = glued(F, patch, originals(images, n)) if len(images) else topology(F, patch, n)
+    topo = glued(F, patch, images, n)
     planes = checked_planes(given["on_planes"], X, F, patch, names, topo, fixed)
     resolved = supports.resolved(plane, planes)
     cables, rooms = checked_cables(given["cables"], topo), checked_rooms(given["rooms"], names)

@@ -168,6 +168,16 @@ def unit_vectors(v: Floats) -> Floats:
     return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
+def end_tangent(t: Floats, lengths: Floats) -> Floats:
+    """(3,) the tangent at the end of a polyline, of length 1, from the directions t (k,3) and lengths (k,) of
+    its last edge and the one before, if there is one: the first turns on by its share of their bend.
+
+    >>> end_tangent(np.array([[1.0, 0, 0], [0.8, -0.6, 0]]), np.array([1.0, 2.0])).round(3).tolist()
+    [0.983, 0.184, 0.0]
+    """
+    return unit_vectors(t[0] + (t[0] - t[-1]) * lengths[0] / lengths.sum())
+
+
 def edge_vectors(P: Floats) -> Floats:
     """(…,m,3,3) edges of triangles; edge k is opposite corner k.
 

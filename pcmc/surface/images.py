@@ -57,9 +57,7 @@ class Imaged:
 
     def topology_of(self, faces: Ints, patch_of_face: Ints) -> Topology:
         """The topology of some of the faces (m,3), images and their vertices as one."""
-        if self.periodic:
-            return glued(faces, patch_of_face, self.original)
-        return topology(faces, patch_of_face, len(self.vertices))
+        return glued(faces, patch_of_face, self.images, len(self.vertices))
 
     @cached_property
     def cell(self) -> Any:
@@ -89,10 +87,12 @@ def originals(images: Ints, n: int) -> Ints:
     return original
 
 
-def glued(faces: Ints, patch_of_face: Ints, original: Ints) -> Topology:
-    """The topology of faces (m,3) whose vertices are images of ``original`` (n,)."""
-    F = read_only(np.ascontiguousarray(original[faces], dtype=np.int32))
-    return topology(F, patch_of_face, len(original), placed=faces)
+def glued(faces: Ints, patch_of_face: Ints, images: Ints, n: int) -> Topology:
+    """The topology of faces (m,3) of n vertices, images (k,2) and their vertices as one."""
+    if not len(images):
+        return topology(faces, patch_of_face, n)
+    F = read_only(np.ascontiguousarray(originals(images, n)[faces], dtype=np.int32))
+    return topology(F, patch_of_face, n, placed=faces)
 
 
 def expect_no_images(surface: Any, what: str) -> None:
@@ -167,19 +167,17 @@ def lattice_of(surface: Any) -> Floats:
     image, vertex = surface.images.T
     near, basis = ON * surface.size, np.empty((0, 3))
     t = surface.vertices[image] - surface.vertices[vertex]
-    given = list(t[np.unique(np.round(t / (2.0 * near)), axis=0, return_index=True)[1]])
-    given.sort(key=np.linalg.norm, reverse=True)
-    while given:  # Euclid's algorithm: what is left of a translation may be shorter than those so far
-        v = given.pop()
+    left = list(t[np.unique(np.round(t / (2.0 * near)), axis=0, return_index=True)[1]])
+    while left:  # Euclid's algorithm: what is left of a translation may be shorter than those so far
+        left.sort(key=np.linalg.norm, reverse=True)
+        v = left.pop()
         v = v - np.round(v @ np.linalg.pinv(basis)) @ basis
         if np.linalg.norm(v) <= near:
             continue
-        if np.linalg.matrix_rank(np.vstack([basis, v]), near) == len(basis):
-            given += [*basis, v]
-            given.sort(key=np.linalg.norm, reverse=True)
-            basis = np.empty((0, 3))
-        else:
-            basis = np.vstack([basis, v])
+        more = np.vstack([basis, v])
+        if np.linalg.matrix_rank(more, near) == len(basis):
+            left, more = [*left, *more], np.empty((0, 3))
+        basis = more
     return read_only(basis)
 
 
@@ -233,11 +231,9 @@ def checked_images(given: Any, X: Floats, F: Ints, fixed: Bools, on_plane: Bools
     )
     for bad, fault, hint in tests:
         checks.refuse_rows("images", pairs, bad, fault, hint)
-    original = originals(pairs, len(X))
-    G = original[F]
-    own = (G[:, [1, 2, 0]] == G).any(axis=1)
+    topo = glued(F, np.zeros(len(F), dtype=np.int32), pairs, len(X))
+    own = (topo.faces[:, [1, 2, 0]] == topo.faces).any(axis=1)
     checks.refuse_rows("faces", F, own, "joins a vertex with its image", COARSE)
-    topo = glued(F, np.zeros(len(F), dtype=np.int32), original)
     one = X[topo.sides[:, 1]] - X[topo.sides[:, 0]]
     along = (X[F[:, [2, 0, 1]]] - X[F[:, [1, 2, 0]]]) * topo.sense[..., None]
     apart = np.linalg.norm(along - one[topo.edge_of_face], axis=2).max(axis=1) > near

@@ -30,8 +30,7 @@ class Lattice(NamedTuple):
     """The nodes of an element, the corners first, and where the small triangles have them."""
 
     nodes: Ints  # (k,3) l = p λ
-    face: Ints  # (k,) a small triangle with the node
-    corner: Ints  # (k,) and which corner of it
+    first: Ints  # (k,) the first of all 3p² corners of the small triangles that is there
     node: Ints  # (p²,3) the node at each corner of the small triangles
 
 
@@ -98,11 +97,9 @@ def lattice(order: int) -> Lattice:
         a, b, c = cut[:, 0], cut[:, 1], cut[:, 2]
         bc, ca, ab = (b + c) // 2, (c + a) // 2, (a + b) // 2
         cut = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, bc, ca, ab], axis=1).reshape(-1, 3, 3)
-    first, node = np.unique(cut.reshape(-1, 3), axis=0, return_index=True, return_inverse=True)[1:]
-    places = cut.reshape(-1, 3)[first]
+    places, first, node = np.unique(cut.reshape(-1, 3), axis=0, return_index=True, return_inverse=True)
     rank = np.lexsort((-places[:, 1], -places[:, 0], places.max(axis=1) < order))
-    node = np.argsort(rank)[np.ravel(node)].reshape(-1, 3)
-    return Lattice(places[rank], first[rank] // 3, first[rank] % 3, node)
+    return Lattice(places[rank], first[rank], np.argsort(rank)[node].reshape(-1, 3))
 
 
 def element_nodes(F: Ints, order: int) -> Ints:
@@ -112,9 +109,9 @@ def element_nodes(F: Ints, order: int) -> Ints:
     """
     here = lattice(order)
     whole = len(F) // order**2 * order**2
-    cut = F[:whole].reshape(-1, order**2, 3)
-    nodes = cut[:, here.face, here.corner]
-    wrong = np.flatnonzero((nodes[:, here.node] != cut).any(axis=(1, 2)))
+    corners = F[:whole].reshape(-1, 3 * order**2)
+    nodes = corners[:, here.first]
+    wrong = np.flatnonzero((nodes[:, here.node.ravel()] != corners).any(axis=1))
     if len(wrong) or whole < len(F):
         face = int(wrong[0]) * order**2 if len(wrong) else whole
         message = f"order {order}: the {order**2} faces from face {face} on are not one triangle cut by"
@@ -151,10 +148,15 @@ def side_shapes(order: int) -> tuple[Floats, Floats, Floats]:
     >>> [values.tolist() for values in side_shapes(1)]
     [[[0.5, 0.5]], [[-1.0, 1.0]], [1.0]]
     """
-    points, weight = np.polynomial.legendre.leggauss(ceil((3 * order - 1) / 2))
-    t, side = 0.5 * (1.0 + points), side_nodes(order)[2]
+    (t, dt), side = _gauss(order), side_nodes(order)[2]
     value, slope, _ = shape_functions(order, np.stack([1.0 - t, t, 0.0 * t], axis=1))
-    return value[:, side], slope[:, side], 0.5 * weight
+    return value[:, side], slope[:, side], dt
+
+
+def _gauss(order: int) -> tuple[Floats, Floats]:
+    """Gauss's points in 0..1 and their weights, exact for degree 3p - 2."""
+    points, weight = np.polynomial.legendre.leggauss(ceil((3 * order - 1) / 2))
+    return 0.5 * (1.0 + points), 0.5 * weight
 
 
 def turned_over(F: Ints, order: int) -> Ints:
@@ -163,11 +165,9 @@ def turned_over(F: Ints, order: int) -> Ints:
     >>> turned_over(np.array([[0, 3, 4], [1, 5, 3], [2, 4, 5], [5, 4, 3]]), 2).tolist()
     [[2, 5, 4], [1, 3, 5], [0, 4, 3], [3, 4, 5]]
     """
-    here = lattice(order)
-    place = {tuple(place): number for number, place in enumerate(here.nodes.tolist())}
-    mirror = np.array([place[tuple(l[::-1])] for l in here.nodes.tolist()])
-    cut = F.reshape(-1, order**2, 3)
-    nodes = cut[:, here.face, here.corner][:, mirror]
+    here, places = lattice(order), lattice(order).nodes.tolist()
+    mirror = [places.index(place[::-1]) for place in places]
+    nodes = element_nodes(F.reshape(-1, 3), order)[:, mirror]
     return np.ascontiguousarray(nodes[:, here.node].reshape(F.shape))
 
 
@@ -204,14 +204,13 @@ def shapes(order: int) -> Shapes:
         points = np.concatenate([np.full((1, 3), 1.0 / 3.0), *rings])
         weight = np.repeat([270.0, 155.0 - root, 155.0 + root], [1, 3, 3]) / 2400.0
     else:
-        from scipy.special import roots_jacobi, roots_legendre  # they take long to import
+        from scipy.special import roots_jacobi  # it takes long to import
 
-        count = ceil((3 * order - 1) / 2)
-        (s, s_weight), (t, t_weight) = roots_jacobi(count, 1, 0), roots_legendre(count)
-        xi, share = np.meshgrid(0.5 * (1.0 + s), 0.5 * (1.0 + t), indexing="ij")
-        eta = (1.0 - xi) * share
-        points = np.stack([1.0 - xi - eta, xi, eta], axis=-1).reshape(-1, 3)
-        weight = np.outer(s_weight, t_weight).ravel() / 8.0
+        t, dt = _gauss(order)
+        s, ds = roots_jacobi(len(t), 1, 0)
+        xi, share = (grid.ravel() for grid in np.meshgrid(0.5 * (1.0 + s), t, indexing="ij"))
+        points = np.stack([(1.0 - xi) * (1.0 - share), xi, (1.0 - xi) * share], axis=1)
+        weight = 0.25 * np.outer(ds, dt).ravel()
     return Shapes(*(read_only(np.ascontiguousarray(a)) for a in (*shape_functions(order, points), weight)))
 
 
@@ -227,8 +226,7 @@ def shape_functions(order: int, points: Floats) -> tuple[Floats, Floats, Floats]
         factor = order * points - s
         value[s + 1] = value[s] * factor / (s + 1)
         slope[s + 1] = (slope[s] * factor + value[s] * order) / (s + 1)
-    power = lattice(order).nodes
-    parts = np.stack([value[power[:, c], :, c] for c in range(3)])  # (3,k,q)
-    turns = np.stack([slope[power[:, c], :, c] for c in range(3)])
-    by = [turns[c] * parts[c - 1] * parts[c - 2] for c in range(3)]
-    return parts.prod(axis=0).T, (by[1] - by[0]).T, (by[2] - by[0]).T
+    power, c = lattice(order).nodes, np.arange(3)
+    parts = value[power, :, c]  # (k,3,q)
+    by = slope[power, :, c] * parts[:, c - 1] * parts[:, c - 2]
+    return parts.prod(axis=1).T, (by[:, 1] - by[:, 0]).T, (by[:, 2] - by[:, 0]).T

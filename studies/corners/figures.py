@@ -80,12 +80,12 @@ def _draw_fits(folder: Folder, ladder: pd.DataFrame) -> None:
     lines(
         curves,
         folder.figure("fits"),
-        x="edge length at the end",
+        x="edge length at the end, in the numbers of the example",
         y="lowest eigenvalue, first mesh: ±1",
         xscale="log",
         markers=True,
         fits=fitted,
-        title="The logarithmic loss of hold: fitted limits with 95 % intervals",
+        title="The logarithmic loss of hold: fitted limits with 95 % intervals, force/length³",
     )
 
 

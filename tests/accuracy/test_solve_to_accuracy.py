@@ -150,7 +150,7 @@ def test_slopes_of_the_reaction_of_a_line_inside(quantity):
 def test_the_largest_pull_of_a_mesh_check_is_the_target(roof):
     heavy = roof.retensioned(weights={roof.patches[0].name: 0.5})
     slope = _slope(heavy, "reaction per length", "")
-    np.testing.assert_array_equal(slope, measure(heavy, Target("reaction")).by_position)
+    np.testing.assert_array_equal(slope, measure(heavy, Target("reaction per length")).by_position)
     assert slope.any()
 
 

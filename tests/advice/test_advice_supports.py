@@ -150,7 +150,7 @@ def test_for_a_drawing_the_ring_is_drawn(tmp_path, monkeypatch):
 @pytest.mark.filterwarnings("ignore::pcmc.base.errors.BalanceWarning")
 def test_for_a_drawing_without_a_project_the_advice_says_how_to_write_one(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("pcmc.plan.proposal.TRIANGLES", 300)
+    monkeypatch.setattr("pcmc.plan.proposal.TRIANGLES", 120)
     document, space = drawn.new()
     space.add_lwpolyline(drawn.BOX, close=True, dxfattribs=drawn.on("outline"))
     space.add_line((6, 0), (6, 6), dxfattribs=drawn.on("divider chancel"))

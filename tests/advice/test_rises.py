@@ -139,6 +139,8 @@ def test_a_rise_is_over_the_outline_and_an_apex_over_the_plane(given):
         (f"{HALL}rise = 1e200\n", "rise"),
         (f"{HALL}rise = 1\napex = 2\n", "rise"),
         (f"{HALL}tension = 3.0\napex = 2\n", "plan.apex"),
+        (f"{HALL}tension = 3.0\nrise = 2\n", "plan.rise"),
+        (f"{HALL}rise = 2\n[plan.patches]\nroof = {{tension = 3}}\n", "plan.rise"),
         (f"{HALL}[plan.patches]\nroof = {{tension = 3, rise = 1}}\n", "rise"),
         (f"{HALL}[plan.patches]\nroof = {{pressure = 1}}\n", "plan.patches.roof.tension"),
     ],

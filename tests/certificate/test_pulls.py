@@ -49,7 +49,7 @@ def test_a_sheet_pulls_with_its_tension_beside_corners_too(outline):
     for roof in refined(Plan(outline, [], tension=6.0, edge_length=1.0).surface()):
         found = pcmc.certify(roof)
         assert found.largest_reaction == pytest.approx(6.0, rel=1e-12)
-        assert measure(roof, Target("reaction")).value == pytest.approx(6.0, rel=1e-12)
+        assert measure(roof, Target("reaction per length")).value == pytest.approx(6.0, rel=1e-12)
         assert {f.value for f in figures(roof, found) if f.quantity == "reaction per length"} == {
             found.acting.largest_per_length()
         }
@@ -86,7 +86,7 @@ def test_a_held_line_between_two_sheets_takes_their_vector_sum(weight):
         np.tile((2.0 + 3.0 * weight) * np.array([1, 0, -1]) / 2**0.5, (len(eaves), 1)),
         atol=1e-12,
     )
-    assert measure(roof, Target("reaction")).value == pytest.approx(np.linalg.norm(expected))
+    assert measure(roof, Target("reaction per length")).value == pytest.approx(np.linalg.norm(expected))
 
 
 def test_directions_are_those_of_the_smooth_surface_in_the_limit():
@@ -167,7 +167,7 @@ def test_the_derivative_of_the_largest_pull(weight):
     rng = np.random.default_rng(4)
     roof = gable(weight)
     roof = roof.moved(roof.vertices + 0.1 * rng.standard_normal((roof.n, 3)))
-    d, target = rng.standard_normal((roof.n, 3)), Target("reaction")
+    d, target = rng.standard_normal((roof.n, 3)), Target("reaction per length")
     found = measure(roof, target)
     assert found.ties is None
 
@@ -191,7 +191,7 @@ def test_a_maximum_that_several_places_share_has_two_derivatives():
     hall = Plan(outline, wall, tension=4.0, edge_length=1.0).surface()
     surface = pcmc.solve(hall).surface
     name = surface.patches[0].name
-    of = [Target("reaction"), Target("lean", "wall"), Target("volume")]
+    of = [Target("reaction per length"), Target("lean", "wall"), Target("volume")]
     table = pcmc.sensitivities(surface, of, [name, Parameter("wall")])
     assert table.index.tolist() == [
         "reaction per length as they fall",

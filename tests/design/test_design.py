@@ -114,7 +114,7 @@ def test_each_quantity_as_a_target(target):
 
 def test_a_limit_holds_only_where_it_binds():
     surface = cap()
-    loose, tight = Target("reaction", at_most=2.0), Target("reaction", at_most=1.0)
+    loose, tight = Target("reaction per length", at_most=2.0), Target("reaction per length", at_most=1.0)
     assert meet(surface, [loose], ["cap"]).solves == 1
     design = meet(surface, [tight], ["cap"])
     assert design.met

@@ -71,7 +71,7 @@ def test_a_flat_membrane_pulls_with_its_tension_at_its_held_boundary():
     F = [t for a, b, c, d in cells for t in ([a, b, c], [a, c, d])]
     rim = np.flatnonzero((X[:, :2].min(axis=1) == 0) | (X[:, :2].max(axis=1) == 1))
     flat = pcmc.Surface(X, F, [0] * 32, [Patch("floor", 3.0, 0.0)], fixed=rim)
-    assert measure(flat, Target("reaction", "floor")).value == pytest.approx(3.0)
+    assert measure(flat, Target("reaction per length", "floor")).value == pytest.approx(3.0)
 
 
 def test_reactions_are_the_certificates():
@@ -81,7 +81,7 @@ def test_reactions_are_the_certificates():
         moved = dataclasses.replace(dome, plane=pcmc.Plane(point))
         boundaries = pcmc.certify(moved).boundaries
         for of in (None, "cap"):
-            found = measure(moved, Target("reaction", of)).value
+            found = measure(moved, Target("reaction per length", of)).value
             assert found == pytest.approx(boundaries["per_length_max"][0], rel=1e-12)
 
 
@@ -90,8 +90,8 @@ def test_reactions_at_the_parts_of_a_roof_are_the_certificates(roof):
     held = found.boundaries.groupby("boundary")["per_length_max"].max()
     assert len(held) == 6
     for name, expected in held.items():
-        assert measure(roof, Target("reaction", name)).value == pytest.approx(expected, rel=1e-12)
-    assert measure(roof, Target("reaction")).value == pytest.approx(held.max(), rel=1e-12)
+        assert measure(roof, Target("reaction per length", name)).value == pytest.approx(expected, rel=1e-12)
+    assert measure(roof, Target("reaction per length")).value == pytest.approx(held.max(), rel=1e-12)
 
 
 def test_heights_are_the_meshs_own(roof):
@@ -146,7 +146,7 @@ def test_sensitivities_are_the_slopes_of_resolved_surfaces(roof):
         Target("volume"),
         Target("area", "corner"),
         Target("area", "wall 1"),
-        Target("reaction", "east"),
+        Target("reaction per length", "east"),
         Target("curvature", "north"),
     ]
     to = [Parameter("north"), Parameter("wall 1"), Parameter("east", "pressure")]

@@ -152,9 +152,15 @@ def test_a_tension_may_be_0_only_where_nothing_presses_or_weighs():
             Parameter("left", low=0.0, high=1.0).bounds(loaded)
 
 
+def test_reaction_alone_is_the_force_of_all_supports_and_no_target():
+    with refused(OptionError, what="quantity", found="reaction") as caught:
+        Target("reaction")
+    assert "did you mean 'reaction per length'?" in str(caught.value)
+
+
 def test_nothing_held_has_no_reaction():
     with refused(OptionError, what="of", found="left"):
-        measure(double_bubble(1.0), Target("reaction", "left"))
+        measure(double_bubble(1.0), Target("reaction per length", "left"))
 
 
 def test_no_equilibrium_to_start_from():

@@ -20,10 +20,11 @@ from generators import (
     spherical_cap_exact,
     two_squares,
 )
-from pcmc import BoundaryMotion, Direction, Patch, Room, Surface, find_equilibria, follow, solve
+from pcmc import BoundaryMotion, Direction, Patch, Room, Surface, find_equilibria, follow, plot, solve
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.equilibria import shape_distance
+from pcmc.equilibria import search, shape_distance
 from pcmc.equilibria.found import Equilibria, WayDown
+from pcmc.explore.page_data import equilibria_data
 from pcmc.forces.functional import patch_areas
 
 SMALL, LARGE = spherical_cap_exact(), spherical_cap_exact(upper=True)
@@ -265,20 +266,44 @@ def test_a_saddle_from_which_no_way_leads_to_a_minimum_is_named():
     assert "The 2 ways down from a saddle of index 1: pinches off or collapses (2)." in str(found)
 
 
-def test_a_search_that_is_stopped_keeps_what_it_has():
+def stopped_at(beginning):
     def stop(step):
-        if step.startswith("following"):
+        if step.startswith(beginning):
             raise StopIteration
 
-    found = find_equilibria(spherical_cap(0.5), callback=stop)
+    return find_equilibria(spherical_cap(0.5), callback=stop)
+
+
+def test_a_search_that_is_stopped_keeps_what_it_has():
+    found = stopped_at("following")
     assert found.stopped
     assert len(found) == 1
     assert "stopped before its end" in str(found)
 
 
+def test_a_search_that_is_stopped_before_the_first_equilibrium_has_none():
+    found = stopped_at("solving")
+    assert str(found).startswith("No equilibrium was found.\n")
+    assert "stopped before its end" in str(found)
+    assert not equilibria_data(found)["equilibria"]
+    assert plot.equilibria(found, width=300).shape[1] == 300
+
+
 def test_a_search_ends_at_the_most_equilibria_that_are_wanted():
     found = find_equilibria(spherical_cap(0.25), starts=0, most=1)
     assert len(found) == 1
+    assert "raise most" in str(found)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_search_that_ends_between_the_two_ways_down_has_no_barrier(monkeypatch, sign):
+    """On one side of Enneper's surface is the minimum that a low start has found, on the other one more."""
+    way_down = search.way_down
+    monkeypatch.setattr(search, "way_down", lambda saddle, mode: way_down(saddle, sign * mode))
+    saddle = solve(enneper(0.4, radius=1.2), target="stationary")
+    found = find_equilibria(saddle, (), starts=0, most=2)
+    assert [one.index for one in found.found] == [0, 1]
+    assert not found.barriers
     assert "raise most" in str(found)
 
 

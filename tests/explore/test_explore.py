@@ -266,6 +266,7 @@ def test_serve_prints_the_address_opens_the_page_and_ends_with_ctrl_c(monkeypatc
     said = capsys.readouterr().out
     assert len(opened) == 1
     assert opened[0] in said
+    assert said.endswith("stopped: the page can compute and save nothing more\n")
     with pytest.raises(ConnectionRefusedError):
         http.client.HTTPConnection(opened[0].split("/")[2], timeout=5).request("GET", "/")
     explore.serve(CAP, open_browser=False)

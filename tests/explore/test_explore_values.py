@@ -108,8 +108,8 @@ def test_no_two_numbers_at_an_axis_read_alike(page):
         const root = document.createElement('div');
         root.innerHTML = '<div class="diagram"></div><ol></ol><div class="detail"></div>';
         const pieces = [{ stable: true, points: [[1, 1234.3], [2, 1236.8]] }];
-        const branches = [{ pieces, parameter: [], height: [], index: [], number: [] }];
-        showDiagram(root, { parameter: 'p', value: 1, branches, equilibria: [], words: [] }, {}, () => {});
+        const found = { parameter: 'p', value: 1, pieces, equilibria: [], beside: [], words: [] };
+        showDiagram(root, found, {}, () => {});
         arguments[0]([...root.querySelectorAll('text')].map((text) => text.textContent));
     })"""
     marks = page.driver.execute_async_script(script)

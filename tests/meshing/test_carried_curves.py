@@ -12,12 +12,12 @@ from refusals import refused
 from scipy.spatial.transform import Rotation
 
 import pcmc
-from pcmc.base.errors import CurveWarning, FileError, SurfaceError
+from pcmc.base.errors import CurveWarning, FileError, FileWarning, LostWarning, SurfaceError
 from pcmc.meshing.held_curves import doubted_midpoints
 from pcmc.meshing.local_refinement import refine_near
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import remesh
-from pcmc.plan import Divider, Plan, arc, bezier, circle, ellipse, join, polyline
+from pcmc.plan import Divider, Hole, Plan, arc, bezier, circle, ellipse, join, polyline
 from pcmc.plan.lines import Kind, PlanLine
 from pcmc.project import load, run_project
 from pcmc.project.cache import plain_bytes
@@ -291,6 +291,33 @@ def test_a_file_keeps_curves_to_the_last_bit(tmp_path):
     assert plain_bytes(read.curves) == plain_bytes(roof.curves)  # else the cache keeps no roof
     free = pcmc.read(tmp_path / "a.pcmc", fixed=np.flatnonzero(roof.fixed)[:1])
     assert not free.curves
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".vtp", ".vtu", ".3dm", ".glb", ".ifc"])
+@pytest.mark.parametrize("wall", [2.0, 9.0])  # the junction of the stronger one rests on its bottom
+def test_every_file_with_a_place_for_texts_keeps_curves(tmp_path, suffix, wall):
+    outline, divider = CURVES["join"], Divider([[0, 0], [0, 1]], wall=wall)
+    eye = Hole(circle([-0.8, 0.5, 0.3], 0.2))
+    roof = pcmc.solve(Plan(outline, [divider], [eye], tension=4.0, edge_length=0.4).surface()).surface
+    pcmc.write(tmp_path / f"a{suffix}", roof)
+    read = pcmc.read(tmp_path / f"a{suffix}")
+    assert len(read.curves) == len(roof.curves)
+    held = [np.unique(one.vertices[one.fixed].round(12) + 0.0, axis=0) for one in map(refine, (roof, read))]
+    np.testing.assert_allclose(*held, atol=1e-12)
+
+
+def test_a_file_says_that_it_has_no_curves(tmp_path):
+    roof = Plan(CURVES["circle"], tension=4.0, edge_length=0.5).surface()
+    for name in ("a.fe", "a.stl"):
+        with pytest.warns(LostWarning, match="the curves that its edges were drawn on"):
+            pcmc.write(tmp_path / name, roof)
+    pcmc.write(tmp_path / "a.obj", roof)
+    text = (tmp_path / "a.obj").read_text(encoding="utf-8")
+    rim = "v " + " ".join(map(repr, roof.vertices[roof.curves[0].vertices[1]].tolist()))
+    assert rim in text
+    (tmp_path / "a.obj").write_text(text.replace(rim, "v 2.6 2.1 0.0"), encoding="utf-8")
+    with pytest.warns(FileWarning, match="curves that edges were drawn on were left out: the surface has"):
+        assert not pcmc.read(tmp_path / "a.obj").curves
 
 
 def test_a_project_keeps_the_curves_of_its_plan(tmp_path):

@@ -17,7 +17,7 @@ import pcmc
 from pcmc import cli, explore
 from pcmc.base.units import Units
 from pcmc.certificate.quantities import QUANTITIES, dimension_of
-from pcmc.design.targets import KINDS, MEASURES, SHORT
+from pcmc.design.targets import KINDS, MEASURES
 from pcmc.explore.page_data import unit_texts
 from pcmc.project import build, cached_files, clear_cache, designed, designing, load, run
 
@@ -202,7 +202,7 @@ def test_targets_are_shown_in_their_units(folder, capsys):
 def test_every_quantity_of_a_target_has_a_unit():
     page = Path(explore.__file__).with_name("page") / "targets.js"
     kinds = dict(re.findall(r"(\w+): \"(\w+)\"", page.read_text(encoding="utf-8").partition("};")[0]))
-    assert kinds == {quantity: dimension_of(SHORT.get(quantity, quantity)) for quantity in kinds}
+    assert kinds == {quantity: dimension_of(quantity) for quantity in kinds}
     assert set(kinds.values()) <= set(unit_texts(Units("m", "kN")))
     assert set(MEASURES) <= set(QUANTITIES)
     for quantity in {*QUANTITIES, *KINDS}:

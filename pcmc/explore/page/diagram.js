@@ -31,8 +31,7 @@ function ticks(low, high) {
 const kind = (index) => (index === 0 ? "stable" : `saddle, index ${index}`);
 
 /** Draw the diagram and list the equilibria; `visit(number)` shows one, or a point of a branch. */
-export function showDiagram(root, { parameter, value, branches, equilibria, words }, units, visit) {
-  const pieces = branches.flatMap((branch) => branch.pieces);
+export function showDiagram(root, { parameter, value, pieces, equilibria, beside, words }, units, visit) {
   const along = pieces.flatMap(({ points }) => points);
   const [x0, x1] = range([value, ...along.map(([p]) => p)]);
   const [y0, y1] = range([...equilibria.map(({ height }) => height), ...along.map(([, h]) => h)]);
@@ -59,12 +58,10 @@ export function showDiagram(root, { parameter, value, branches, equilibria, word
     for (const one of svg.querySelectorAll("circle")) one.setAttribute("aria-current", one.dataset.number === String(number));
     visit(number);
   };
-  const point = (at, height, index, number, big) => {
+  const point = (number, at, { height, index }, look) => {
     const words = `${parameter} ${digits(at)}, height ${digits(height)}: ${kind(index)}`;
-    const circle = drawn("circle", {
-      cx: x(at), cy: y(height), r: big ? 5 : 4, class: big ? "" : "way", tabindex: 0, role: "button",
-      "aria-label": words, "data-number": number,
-    });
+    const button = { tabindex: 0, role: "button", "aria-label": words, "data-number": number };
+    const circle = drawn("circle", { cx: x(at), cy: y(height), ...look, ...button });
     circle.append(drawn("title", {}, words));
     circle.onclick = () => shown(number);
     circle.onkeydown = ({ key }) => { if (key === "Enter" || key === " ") shown(number); };
@@ -74,11 +71,11 @@ export function showDiagram(root, { parameter, value, branches, equilibria, word
     const line = points.map(([p, h]) => `${x(p)},${y(h)}`).join(" ");
     svg.append(drawn("polyline", { points: line, class: stable ? "" : "saddle" }));
   }
-  for (const { parameter: at, height, index, number } of branches) at.forEach((p, k) => point(p, height[k], index[k], number[k], false));
-  equilibria.forEach(({ height, index, number }) => point(value, height, index, number, true));
+  beside.forEach((row, k) => point(equilibria.length + k, row.parameter, row, { r: 4, class: "way" }));
+  equilibria.forEach((row, k) => point(k, value, row, { r: 5 }));
   root.querySelector(".diagram").replaceChildren(svg);
-  root.querySelector("ol").replaceChildren(...equilibria.map(({ index, energy, number }) => element("li",
-    element("button", { type: "button", onclick: () => shown(number) },
+  root.querySelector("ol").replaceChildren(...equilibria.map(({ index, energy }, k) => element("li",
+    element("button", { type: "button", onclick: () => shown(k) },
       `${kind(index)}, E = ${digits(energy, 5)}${units.given ? ` ${units.energy}` : ""}`))));
   root.querySelector(".detail").replaceChildren(
     element("p", "Solid: stable. Dashed: saddles. Click a point to see the roof there."),

@@ -132,7 +132,7 @@ def test_a_small_mesh_has_all_its_modes():
 
 def test_sensitivities_are_the_limits_of_differences():
     targets = [Target("apex"), Target("pressure", "room"), Target("curvature", "cap"), Target("area"),
-               Target("volume"), Target("reaction")]  # fmt: skip
+               Target("volume"), Target("reaction per length")]  # fmt: skip
     surface = pcmc.solve(cap(1.5, 0.4)).surface
     table = sensitivities(surface, targets, ["cap", Parameter("room", "volume")])
     h = 1e-4
