@@ -232,7 +232,8 @@ def folded_over(surface: Surface, pinchable: Bools) -> str:
     sizes = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
     cosines = np.einsum("ij,ij->i", vectors[one], vectors[other])
     start = surface.faces[sides // 3, (sides % 3 + 1) % 3]
-    cosines[start[:, 0] == start[:, 1]] *= -1.0  # both run along the edge in one direction: opposite sides
+    # where both run along the edge in one direction, they show opposite sides
+    cosines = np.where(start[:, 0] == start[:, 1], -cosines, cosines)
     back = cosines < np.cos(np.radians(FOLDED)) * sizes[one] * sizes[other]
     if not back.any():
         return ""
