@@ -224,7 +224,7 @@ def folded_over(surface: Surface, pinchable: Bools) -> str:
     out: their area counts for nothing.
     """
     topo, counts = surface.topology, (surface.tensions != 0.0) | (surface.weights != 0.0)
-    free = ~surface.fixed[topo.edges].all(axis=1)
+    free = ~(surface.fixed[topo.edges[:, 0]] & surface.fixed[topo.edges[:, 1]])
     free[topo.edge_numbers(surface.cable_edges.ends)] = False
     free[topo.edges_of((pinchable | ~counts)[surface.patch_of_face])] = False
     sides = topo.neighbours[free[topo.valence == 2]]
