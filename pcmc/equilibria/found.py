@@ -24,7 +24,6 @@ INCOMPLETE = (
     " reaches, and no start comes near, is missed. A barrier is the lowest of the saddles found, so an upper"
     " bound; a lower pass cannot be excluded."
 )
-LOST = "leads to no known end"  # how a way down ends that the solver gave up
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +61,7 @@ class WayDown:
     saddle: int
     to: int | None
     end: str = ""
+    lost: bool = False  # whether the solver gave it up, so that its end is not known
 
 
 def pairs(ways: Sequence[WayDown]) -> Iterator[tuple[WayDown, WayDown]]:
@@ -78,6 +78,7 @@ class Barrier:
     to: int | None  # None where the way down ends at no minimum
     energy: float  # E of the saddle less that of the minimum, force·length
     end: str = ""
+    lost: bool = False  # whether the solver gave that way up
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +142,7 @@ class Equilibria:
             for here, there in ((one, other), (other, one)):
                 if here.to is not None:
                     height = self[here.saddle].energy - self[here.to].energy
-                    rows.append(Barrier(here.to, here.saddle, there.to, height, there.end))
+                    rows.append(Barrier(here.to, here.saddle, there.to, height, there.end, there.lost))
         return tuple(sorted(rows, key=lambda row: (row.start, row.energy)))
 
     def barrier(self, start: int, to: int | None = None) -> float:
@@ -152,8 +153,8 @@ class Equilibria:
         """
         validate.choice("start", str(validate.integer("start", start)), [str(k) for k in self.stable])
         if to is None:
-            known = (b for b in self.barriers if not b.end.startswith(LOST))
-            ways = (b.energy for b in known if b.start == start and b.to != start)
+            out = (b for b in self.barriers if b.start == start and b.to != start)
+            ways = (b.energy for b in out if not b.lost)
             return min(ways, default=math.inf)
         validate.choice("to", str(validate.integer("to", to)), [str(k) for k in self.stable])
         reached, top = set[int | None]({start}), -math.inf

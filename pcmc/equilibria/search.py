@@ -23,7 +23,7 @@ from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
 from .branches import Span, TracedParameter, join_branches
-from .found import LOST, Equilibria, FoundEquilibrium, WayDown, pairs
+from .found import Equilibria, FoundEquilibrium, WayDown, pairs
 from .from_known import deflated_newton, pass_between, way_down, with_good_triangles
 from .shapes import Shape
 
@@ -313,8 +313,8 @@ class _Search:
                 to = None
                 if status is Status.CONVERGED:
                     to = self.add(with_good_triangles(surface), "on the way down from a saddle")
-                end = "" if to is not None else ENDS.get(status, f"{LOST} ({status.name.lower()})")
-                ways.append(WayDown(number, to, end))
+                end = ENDS.get(status, f"leads to no known end ({status.name.lower()})") if to is None else ""
+                ways.append(WayDown(number, to, end, lost=to is None and status not in ENDS))
         if one.index == 1:  # both at once, also where the search ends between them
             self.ways += ways
         ends = [way.end for way in ways]
@@ -356,7 +356,9 @@ class _Search:
         """The equilibria by energy, the numbers of the ways down with them."""
         order = sorted(range(len(self.found)), key=lambda k: self.found[k].energy)
         number = {k: place for place, k in enumerate(order, 1)}
-        ways = [WayDown(number[w.saddle], None if w.to is None else number[w.to], w.end) for w in self.ways]
+        ways = [
+            replace(w, saddle=number[w.saddle], to=None if w.to is None else number[w.to]) for w in self.ways
+        ]
         branches = {line.name: tuple(self.branches[line.name]) for line in self.lines}
         searched = [
             f"Branches followed in {line.name}, from {line.span[0]:.4g} to {line.span[1]:.4g}"

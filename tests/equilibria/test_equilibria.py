@@ -248,7 +248,7 @@ def test_a_way_that_the_solver_lost_is_no_way_out():
     """Where it stalls, nobody knows what lies there; where the roof inflates, it has left the minimum."""
     shapes = [(0, 0.0), (1, 1.0), (1, 2.0)]
     found = tuple(SimpleNamespace(index=index, energy=energy) for index, energy in shapes)
-    lost = WayDown(2, 1), WayDown(2, None, "leads to no known end (stalled)")
+    lost = WayDown(2, 1), WayDown(2, None, "stalled", lost=True)
     out = WayDown(3, 1), WayDown(3, None, "inflates without bound")
     both = Equilibria(found, (*lost, *out), (), {})
     assert both.barrier(1) == 2.0
