@@ -368,6 +368,8 @@ def equilibria_(
         roof = what.roof(arguments.load_project(file, units), progress, whole)
         options: dict[str, Any] = {"starts": starts, "seed": seed, "mesh_check": mesh_check, "span": ends}
         found = find_equilibria(roof.shown.surface, along or "pressure", callback=progress, **options)
+        if not found.found:
+            raise KeyboardInterrupt  # it was stopped before the first
         jobs: list[Any] = []
         for path in files:
             if path in pictures:

@@ -171,8 +171,8 @@ class Equilibria:
         shown = self.table.drop(columns=["mesh"] * (not any(one.mesh_check for one in self.found)))
         numbers = shown.select_dtypes(float).columns
         table = shown.assign(**{name: shown[name].map("{:.6g}".format) for name in numbers})
-        rows = table.rename(columns=lambda name: name.replace("_", " ")).to_string(index=False)
-        rows = rows if self.found else "No equilibrium was found."
+        table = table.rename(columns=lambda name: name.replace("_", " "))
+        rows = table.to_string(index=False) if self.found else "No equilibrium was found."
         half = ", ".join(self.found[0].certificate.symmetric_in) if self.found else ""
         if half:
             half = f"All this is of a part of the roof; shapes that are not symmetric in {half} were left out"

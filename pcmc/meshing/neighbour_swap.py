@@ -19,7 +19,7 @@ from ..base.tolerances import ON
 from ..forces.functional import energy, patch_volumes
 from ..forces.rooms import prescribed_volumes
 from ..surface import Patch, Room, Surface
-from ..surface.geometry import area_vectors, edge_vectors, face_areas, segment_lengths
+from ..surface.geometry import area_vectors, edge_vectors, face_areas, segment_lengths, vertex_sums
 from ..surface.images import lattice_of
 from ..surface.lagrange import expect_flat
 from ..surface.supports import apply_supports
@@ -107,7 +107,7 @@ def lattice_steps(lattice: Floats, vectors: Floats) -> Ints:
 
 
 def shortest(lattice: Floats, vectors: Floats) -> Floats:
-    """Vectors (…,3) to what is nearest of all that these translations (d,3) bring to where they lead."""
+    """(…,3) the shortest of all vectors that differ from these (…,3) by translations of a lattice (d,3)."""
     return np.asarray(vectors - lattice_steps(lattice, vectors) @ lattice)
 
 
@@ -143,7 +143,7 @@ def _apart(surface: Surface, curve: EdgeCurve, one: int, other: int) -> Floats:
 
 
 def swap(surface: Surface, patch: str) -> tuple[Surface, str]:
-    """The surface with other neighbours of a film between two junctions, not solved; a sentence who meets.
+    """The surface with other neighbours of a film between two junctions, not solved; and in words who meets.
 
     The new film has the name, tension and weight of the old one. Its pressure, its snow and the rooms that
     it bounds follow from the sheets beside it. A roof over the film goes along: the patches at its sides
@@ -255,14 +255,11 @@ def collapsed(surface: Surface, patch: str) -> tuple[Film, _Mesh, Ints]:
 def _opening(surface: Surface, film: Film, mesh: _Mesh, edges: Ints) -> Floats | None:
     """(n,3) the unit vectors along which the curve opens towards A and C; None where it stays closed."""
     at, beside = mask_of(edges, len(mesh.X)), mesh.beside(film, edges)
-    P, patch = mesh.corners(surface)[beside], mesh.patch[beside]
-    normal, area = area_vectors(P), face_areas(P)
-    weight = 0.5 * surface.tensions[patch] / np.where(area > 0.0, area, 1.0)
-    pull = np.zeros((len(surface.patches), *mesh.X.shape))  # of each sheet, - α ∂A/∂x, (15a)
-    corner_pull = weight[:, None, None] * np.cross(edge_vectors(P), normal[:, None])
-    np.add.at(pull, (patch[:, None], mesh.vertices[beside]), corner_pull)
-    (a, c), (b, d) = film.one_side, film.other_side
-    new, old = 0.5 * (pull[a] + pull[c] - pull[b] - pull[d]), 0.5 * (pull[a] + pull[b] - pull[c] - pull[d])
+    P, V, patch = mesh.corners(surface)[beside], mesh.vertices[beside], mesh.patch[beside]
+    normal = area_vectors(P) / np.maximum(face_areas(P), 1e-300)[:, None]
+    pull = 0.25 * surface.tensions[patch, None, None] * np.cross(edge_vectors(P), normal[:, None])  # (15a)
+    sides = (np.isin(patch, pair)[:, None, None] for pair in (film.one_side, film.sheets[::2]))  # A, C; A, B
+    new, old = (vertex_sums(np.where(side, pull, -pull), V, len(at)) for side in sides)
     guided = mesh.supports[:, 2 + len(surface.on_planes) :].any(axis=1)
     at &= ~mesh.supports[:, 0] | guided  # a fixed end stays one
     span = shortest(lattice_of(surface), mesh.X[edges[:, 1]] - mesh.X[edges[:, 0]])

@@ -17,6 +17,7 @@ from ..base.files import as_path, atomic_write, check_name, suffix_of, writing
 from ..certificate.supports import support_vertices
 from ..forces.cables import pull_along
 from ..forces.motion_space import perpendicular
+from ..surface.geometry import unit_vectors
 from .frames import bar_axes
 from .loads import Step
 from .material import Material
@@ -142,7 +143,8 @@ def _ties(model: StructuralModel, number: Ints) -> Iterator[str]:
         if v in turns or stops not in ("", "123"):
             axes = model.axes[v]
             if v in turns:  # those that are held first
-                axes = turns[v] if len(turns[v]) > 1 else np.concatenate([turns[v], *perpendicular(turns[v])])
+                held = _stopped_about(model, v, turns[v])
+                axes = held if len(held) > 1 else np.concatenate([held, *perpendicular(held)])
             yield f"*NSET, NSET=BEAM_{node}\n{node}\n"
             yield card(f"TRANSFORM, NSET=BEAM_{node}, TYPE=R", axes[:2].reshape(1, 6))
         yield "".join(f"*BOUNDARY\n{node},{axis},{axis}\n" for axis in stops)
@@ -151,6 +153,25 @@ def _ties(model: StructuralModel, number: Ints) -> Iterator[str]:
         for axis in sorted({"1", "2", "3"} - set(stops)):
             yield f"*EQUATION\n2\n{node},{axis},1.,{v + 1},{axis},-1.\n"
     yield _set("ENDS", number[model.tied[model.held[model.tied]]] - 1)
+
+
+def _stopped_about(model: StructuralModel, v: int, turns: Floats) -> Floats:
+    """(k,3) the axes about which CalculiX has to stop turns, to stop those about ``turns`` (k,3). Where one
+    bar ends alone, with the section b · h, it stops the mean turn of the section's corners r about an axis a,
+
+        Σ (a × r) · (ω × r) / r² = 4 (a_x ω_x + a_y ω_y h²/(b² + h²) + a_z ω_z b²/(b² + h²)) = 0,
+
+    x along the bar, z upright: the components of a are those of the turn over these shares.
+    """
+    bars = [(line, pair) for line in model.beams for pair in line.pairs if v in pair]
+    if len(turns) > 1 or len(bars) > 1:
+        return turns
+    (line, pair), up = bars[0], np.array(model.surface.plane.normal)
+    axes, b, h = (
+        bar_axes(model.standing.vertices, pair[None], up)[0][0],
+        *line.member.profile.equal_rectangle[:2],
+    )
+    return unit_vectors((turns @ axes.T / [1.0, h**2 / (b**2 + h**2), b**2 / (b**2 + h**2)]) @ axes)
 
 
 def _material(name: str, material: Material, unit: float) -> str:

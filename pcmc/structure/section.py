@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
+import numpy as np
+
 from ..base import validate
 from ..base.errors import LoadWarning, OptionError, unknown
 from ..plan import Plan
@@ -299,9 +301,11 @@ class Structure:
                     text = f"{zone['case']}: its area is on one side of the {plane}, and the whole has it"
                     text += " there alone; if its image is meant, too, draw it"
                     warnings.warn(text, LoadWarning, stacklevel=3)
-            return self.of_whole(surface, whole, plan).check(whole, plan)
+            structure = self.of_whole(surface, whole, plan)
+            _name_oblique_warps(structure.materials(whole), surface)
+            return structure.check(whole, plan)
         self.thicknesses(surface)
-        self.materials(surface)
+        _name_oblique_warps(self.materials(surface), surface)
         members = members_of(self.members, plan)
         lines = lines_on(surface, members)
         check_loads(self.loads_on(surface), surface, [line.wall for line in lines])
@@ -319,6 +323,20 @@ class Structure:
         about["members"] = members_of(self.members, plan)
         of_patches = self.materials(plain), self.thicknesses(plain)
         return StructuralModel(surface, *of_patches, self.loads_on(plain), **about)
+
+
+def _name_oblique_warps(materials: Material | Mapping[str, Material], piece: Surface) -> None:
+    """Warn of a cloth whose warp is another one behind a mirror plane of a ``piece``."""
+    mirrors = [plane for plane, _ in piece.on_planes if plane.mirror]
+    named = materials if isinstance(materials, Mapping) else {"": materials}
+    for (name, material), mirror in product(named.items(), mirrors):
+        square, along = np.cross(material.warp, mirror.normal), np.dot(material.warp, mirror.normal)
+        if material.cloth and min(np.linalg.norm(square), abs(along)) > 1e-6 * np.linalg.norm(material.warp):
+            of = f" of {name!r}" if name else ""
+            text = f"warp {list(material.warp)}{of} is neither along the {mirror} nor square to it; behind it"
+            text += " the part has the image of the warp, and the whole, --whole, the same direction"
+            warnings.warn(text, LoadWarning, stacklevel=4)
+            return
 
 
 def members_of(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> tuple[Member, ...]:

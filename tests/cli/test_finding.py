@@ -43,6 +43,16 @@ def test_a_part_says_what_was_left_out_and_the_whole_has_it(cap, capsys):
         assert pd.read_csv("t.csv").energy[0] == pytest.approx(times * pcmc.energy(half), rel=1e-9)
 
 
+def test_ctrl_c_before_the_first_equilibrium_is_130_and_writes_nothing(cap, monkeypatch, capsys):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pcmc.equilibria.search.solve", stop)
+    assert cli.main(["equilibria", "cap.pcmc", "-o", "cap.svg", "-o", "cap.csv"]) == 130
+    assert capsys.readouterr() == ("", "pcmc: stopped\n")
+    assert [path.name for path in cap.iterdir()] == ["cap.pcmc"]
+
+
 def test_a_surface_found_is_not_written_over_the_one_that_is_read(cap, capsys):
     (cap / "cap.pcmc").rename(cap / "roof-1.pcmc")
     before = (cap / "roof-1.pcmc").read_bytes()

@@ -106,6 +106,18 @@ def test_volumes_of_bubbles_are_those_of_voronoi_cells():
     assert room_volumes(weaire_phelan_foam(0)) * 1024 == pytest.approx([125] * 2 + [129] * 5)
 
 
+def test_volumes_are_exact_in_cells_that_are_sheared_and_turned_over():
+    """x → x A + b takes each volume |det A| times."""
+    foam, random = weaire_phelan_foam(0), np.random.default_rng(5)
+    for A in random.standard_normal((6, 3, 3)):
+        rooms = [
+            Room(room.name, {name: int(sign * np.sign(np.linalg.det(A))) for name, sign in room.patches}, 1.0)
+            for room in foam.rooms
+        ]
+        moved = foam.rebuilt(vertices=foam.vertices @ A + random.standard_normal(3), rooms=rooms)
+        assert room_volumes(moved) == pytest.approx(abs(np.linalg.det(A)) * room_volumes(foam), rel=1e-12)
+
+
 def test_the_volume_of_a_tube_is_its_section_times_its_length():
     errors = [room_volumes(tube(3.0, around))[0] - 3.0 * np.pi for around in (12, 24, 48)]
     assert orders(errors) == pytest.approx(2.0, abs=0.1)

@@ -281,6 +281,18 @@ def test_a_zone_on_one_side_alone_is_named_in_the_whole(east, told):
     assert ["drift: its area is on one side" in str(warning.message) for warning in caught] == [True] * told
 
 
+@pytest.mark.parametrize("unfold", [False, True])
+@pytest.mark.parametrize(("warp", "told"), [((1, 0, 0), 0), ((0, 1, 0), 0), ((0, 1, 1), 0), ((2, 1, 0), 1)])
+def test_an_oblique_warp_at_a_mirror_is_named(warp, told, unfold):
+    """The part under load has its image behind the mirror, the whole the same direction there."""
+    cloth = Structure(young=5e5, weft=3e5, shear=1e4, warp=warp, thickness=1e-3, cable_area=1e-4)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        cloth.check(halves()[0], unfold=unfold)
+    said = [str(warning.message) for warning in caught]
+    assert ["neither along the mirror plane" in text for text in said] == [True] * told
+
+
 def test_the_command_names_such_a_zone_once(tmp_path, capsys):
     path = tmp_path / "half.toml"
     path.write_text(
