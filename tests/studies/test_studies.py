@@ -85,9 +85,7 @@ def test_shrunken_figures_keep_rare_colours(tmp_path, monkeypatch):
     monkeypatch.setattr("studies.folder.LARGE", 10_000)
     rows, columns = np.mgrid[0:100, 0:150]
     rng = np.random.default_rng(1)
-    picture = np.stack([rows, columns, 200 + rng.integers(0, 50, rows.shape)], axis=2).astype(
-        np.uint8
-    )
+    picture = np.stack([rows, columns, 200 + rng.integers(0, 50, rows.shape)], axis=2).astype(np.uint8)
     picture[10:16, 10:16] = rare = (238, 136, 102)  # as in a legend
     folder = Folder(tmp_path)
     Image.fromarray(picture).save(folder.figure("a"))
