@@ -35,7 +35,7 @@ class BorderedFactor:
 
     @cached_property
     def _small(self) -> Floats:
-        return np.linalg.pinv(self.schur)
+        return np.asarray(np.linalg.pinv(self.schur), dtype=np.float64)
 
     def solve(self, right: Floats) -> Floats:
         """(s, μ) (N+k,) with A s + P μ and Q s + D μ as given in ``right``, or several of them (N+k,j)."""
