@@ -193,19 +193,24 @@ class StandingPart:
         moved, drop = rows.top_places(X) - rows.top_places(before), rows.drops(self.surface, X)
         return bool((np.linalg.norm(moved, axis=1) <= STILL * np.linalg.norm(drop, axis=1)).all())
 
-    def landed(self, X: Floats, down: Bools, space: MotionSpace | None = None) -> Floats:
+    def landed(
+        self, X: Floats, down: Bools, space: MotionSpace | None = None, before: Floats | float = 0.0
+    ) -> Floats:
         """X (n,3) with the vertices ``down`` on Π or on their bottom, and the rows of walls below.
 
         With a motion space given, the other vertices over a held bottom slide along the junction to above
-        their vertices of that.
+        their vertices of that: no farther than from ``before`` to X, so that a short move changes E little.
         """
-        walls = self.walls
+        walls, moved = self.walls, np.linalg.norm(X - before, axis=1)
         X = _put_down(self.surface, walls, X, down)
         sliding = self.standing & ~down & walls.held
         if space is not None and sliding.any():
             gap = X - X[walls.foot]
             change = np.where(sliding[:, None], walls.across_bottom(gap, X) - gap, 0.0)
-            X += change - space.project(change)
+            change -= space.project(change)
+            far = np.linalg.norm(change, axis=1) > moved
+            change[far] *= (moved[far] / np.linalg.norm(change[far], axis=1))[:, None]
+            X += change
         return self.follow(X, space)
 
 

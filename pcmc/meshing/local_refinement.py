@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 from ..base import validate
 from ..base.arrays import Bools, Ints, mask_of
 from ..base.errors import OptionError
-from ..forces.pinching import lift, standing_part
-from ..forces.wall_rows import Walls
+from ..forces.pinching import standing_part
+from ..forces.wall_rows import Walls, find_walls
 from ..surface import Surface
 from ..surface.geometry import segment_lengths
 from ..surface.lagrange import expect_flat
@@ -18,7 +18,7 @@ from ..surface.topology import edge_places
 from .curve_cutting import cut_triangles
 from .quality import edge_lengths
 from .refinement import Projection, with_vertices_on
-from .remeshing import RAISED
+from .remeshing import raised
 
 TALL = 4.0  # heights of a wall over the length of its top edge: a higher column does not come to rest
 
@@ -54,13 +54,14 @@ def refine_near(
         message = f"points: expected {expected}, found an array of shape {found}"
         raise OptionError(message, what="points", found=found, expected=expected)
     levels, radius = validate.integer("levels", levels), validate.positive("radius", radius)
-    tree = cKDTree(places)
+    tree, rests = cKDTree(places), bool(standing_part(surface).walls.held.any())
     for level in range(levels):
         corners = surface.vertices[surface.faces]
         middle = corners.mean(axis=1)
         reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
         distance = tree.query(middle)[0] - reach  # of the ball around the triangle: no more than its own
-        surface = refine_faces(surface, distance <= radius * 0.5**level, project)
+        near = distance <= radius * 0.5**level
+        surface = _refined(surface, near, project, held=rests) if near.any() else surface
     return surface
 
 
@@ -88,24 +89,28 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
     >>> refine_faces(square, [0]).m
     6
     """
-    expect_flat(surface, "refine_faces")
-    given, faces, topo = np.asarray(chosen), np.zeros(surface.m, dtype=bool), surface.topology
+    given, faces = np.asarray(chosen), np.zeros(surface.m, dtype=bool)
     is_mask = given.dtype == bool and given.shape == faces.shape
     if not is_mask and given.size:
         indices = np.issubdtype(given.dtype, np.integer) and given.ndim == 1
         if not (indices and given.min() >= 0 and given.max() < surface.m):
             validate.refuse("chosen", chosen, f"a ({surface.m},) mask, or indices below {surface.m}")
     faces[given if is_mask else given.astype(np.int64)] = True
-    if not faces.any():
-        return surface
+    return _refined(surface, faces, project, held=False) if faces.any() else surface
+
+
+def _refined(surface: Surface, faces: Bools, project: Projection | None, held: bool) -> Surface:
+    """The same with ``faces`` (m,) cut; with ``held``, walls over held bottoms are cut in columns, too."""
+    expect_flat(surface, "refine_faces")
+    topo = surface.topology
     cut = mask_of(topo.edge_of_face[faces], len(topo.edges))
-    part = standing_part(surface)
-    surface = lift(surface, part.walls, part.resting, RAISED)
+    walls = find_walls(surface, held=True) if held else standing_part(surface).walls
+    surface = raised(surface)
     # the corner opposite each longest side; of sides equal but for rounding, one edge for all triangles
     length = edge_lengths(surface).astype(np.float32)
     rank = np.argsort(np.argsort(length, kind="stable"))
     longest = rank[topo.edge_of_face].argmax(axis=1)
-    columns, first = _wall_columns(surface, part.walls), topo.edge_of_face[np.arange(surface.m), longest]
+    columns, first = _wall_columns(surface, walls), topo.edge_of_face[np.arange(surface.m), longest]
     count = 0
     while count < cut.sum():
         count = cut.sum()
@@ -117,7 +122,10 @@ def refine_faces(surface: Surface, chosen: Bools | Ints, project: Projection | N
 
 
 def _wall_columns(surface: Surface, walls: Walls) -> Ints:
-    """(e,) the low column below a top edge that an edge crosses, itself included; -1 for none."""
+    """(e,) the column below a top edge that an edge crosses, itself included; -1 for none.
+
+    It is low, or over a held bottom: there the vertices of both edges are pairs.
+    """
     rows, tops, X = walls.rows, walls.top_edges, surface.vertices
     height = np.abs(surface.plane.height(X))[tops].max(axis=1, initial=0.0)
     above = np.full(surface.n, -1, dtype=np.int64)  # the top vertex straight above
@@ -125,4 +133,5 @@ def _wall_columns(surface: Surface, walls: Walls) -> Ints:
         straight = rows.fraction == end
         above[rows.vertices[straight]] = rows.top_ends[straight, end]
     above[tops] = tops
-    return edge_places(above[surface.topology.edges], tops[height <= TALL * segment_lengths(X, tops)])
+    low = (height <= TALL * segment_lengths(X, tops)) | (walls.foot[tops] >= 0).all(axis=1)
+    return edge_places(above[surface.topology.edges], tops[low])

@@ -20,6 +20,7 @@ from ..surface import Surface
 from ..surface.geometry import angles, area_vectors, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import two_digits
+from ..surface.supports import members
 from ..surface.topology import SIDES, edge_places
 from .curve_cutting import CurveMesh, check_sizes, cut_curves, limit_growth, sizes_at, triangles_for
 from .quality import edge_lengths, improve_angles
@@ -32,6 +33,7 @@ BEYOND = 2.0  # times the chord wanted: where these edges are farther off, MMG g
 MOST = 20_000_000  # triangles; more mean a mistake in the edge length
 PASSES = 3  # of MMG at most, each on the result of the one before; a patch takes its best
 GOOD_ANGLE = 25.0  # degrees; no further pass is made when all angles reach it
+FLAT_ANGLE = 0.1  # degrees; a triangle below it is as good as one without area
 LEAST_ANGLE = 20.0  # degrees; a patch that stays below it ...
 WORSE = 0.8  # ... and below this share of its old smallest angle keeps its old triangles, cut
 RAISED = 0.25  # of its spacing: height to which a resting junction is lifted, so that its wall has area
@@ -96,8 +98,7 @@ def remesh(
     _refuse_too_many(surface, along_curves, "near_curves")  # curves are cut with the mesh around them
     if chord is not None:
         _refuse_flat_chord(surface, chord, float(size.min()))
-    part = standing_part(surface)
-    surface = lift(surface, part.walls, part.resting, RAISED)
+    surface = raised(surface)
     mesh = old = cut_curves(surface, along_curves, project)
     chord = CHORD * float(size.max()) if chord is None else chord
     candidates = []
@@ -109,6 +110,23 @@ def remesh(
         if angles(mesh.X[mesh.F]).min() >= GOOD_ANGLE:
             break
     return _assembled(surface, old, candidates)
+
+
+def raised(surface: Surface) -> Surface:
+    """The surface with resting junctions lifted by ``RAISED`` of their spacing, and no triangle without area.
+
+    A vertex of a wall may have its place at rest on one line with the two others of a triangle.
+    """
+    part = standing_part(surface)
+    if not part.resting.any():
+        return surface
+    walls, rows = part.walls, part.walls.rows
+    lifted = lift(surface, walls, part.resting, RAISED)
+    inner = mask_of(rows.vertices[rows.relative_height > 0.0], surface.n) & ~members(
+        surface.on_planes, surface.n
+    )
+    faces = surface.faces[walls.pinchable[surface.patch_of_face]]
+    return lifted.moved(improve_angles(lifted.vertices, faces, inner, FLAT_ANGLE))
 
 
 def size_note(surface: Surface, edge_length: float) -> str:

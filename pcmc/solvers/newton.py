@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.errors import CurvedContactError, SurfaceError
 from ..base.tolerances import POOR
-from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends, slipping_rings
+from ..certificate.diagnosis import describe_saddle, slipping_ends, slipping_rings
 from ..forces.functional import energy
 from ..forces.rooms import check_rooms, prescribed_volumes, room_pressures, room_volumes
 from ..forces.wall_rows import find_walls
@@ -94,10 +94,9 @@ def _with_volumes(surface: Surface) -> Surface:
 def _solve_level(
     surface: Surface, options: NewtonOptions, log: Log, level: int, rows: list[dict[str, Any]]
 ) -> NewtonRun:
-    """Solve on one mesh; where a junction comes down on a held bottom, once more so that it can rest."""
+    """Solve on one mesh; where that fails, once more so that junctions can rest on held bottoms."""
     end = _attempts(NewtonRun(surface, options, log, level, rows))
-    lost = end.status in LOST and held_wall_down(end.state.result_surface(), end.state.walls.pinchable)
-    if not (lost and find_walls(surface, held=True).held.any()):
+    if end.status not in LOST or not find_walls(surface, held=True).held.any():
         return end
     again = _attempts(NewtonRun(surface, options, log, level, end.rows, held=True))
     return again if again.status in (Status.CONVERGED, Status.SADDLE, Status.STOPPED) else end

@@ -153,7 +153,7 @@ class SolverState:
         down = part.coming_down(X, self.at.X, LOW * self._damping * self.spacing)
         if not down.any() and part.hardly_moves(self.at.X, X):
             return X, down
-        return part.landed(X, down, self.at.space), down
+        return part.landed(X, down, self.at.space, self.at.X), down
 
     def spoils_triangles(self, X: Floats) -> bool:
         """Whether the move to X turns a triangle over, makes the worst much worse or leads too far out."""

@@ -332,10 +332,9 @@ def _name_oblique_warps(materials: Material | Mapping[str, Material], piece: Sur
     for (name, material), mirror in product(named.items(), mirrors):
         square, along = np.cross(material.warp, mirror.normal), np.dot(material.warp, mirror.normal)
         if material.cloth and min(np.linalg.norm(square), abs(along)) > 1e-6 * np.linalg.norm(material.warp):
-            text = (
-                f"warp{f' of {name!r}' if name else ''}: {list(material.warp)} is neither along the {mirror}"
-            )
-            text += " nor square to it; behind it the part has its image, and the whole roof has the same"
+            of = f" of {name!r}" if name else ""
+            text = f"warp {list(material.warp)}{of} is neither along the {mirror} nor square to it; behind it"
+            text += " the part has the image of the warp, and the whole, --whole, the same direction"
             warnings.warn(text, LoadWarning, stacklevel=4)
             return
 

@@ -10,7 +10,7 @@ from shapes import placed, rotation
 from starts import four_fans, stationary, two_squares, uneven
 
 import pcmc
-from pcmc import Patch, Surface, Verdict, certify, energy, solve
+from pcmc import Patch, Surface, Verdict, certify, check_mesh, energy, solve
 from pcmc.forces.functional import energy_and_gradient
 from pcmc.forces.pinching import (
     StandingPart,
@@ -25,8 +25,9 @@ from pcmc.forces.pinching import (
 from pcmc.forces.wall_rows import _held_feet, find_walls
 from pcmc.meshing.quality import triangle_quality
 from pcmc.meshing.refinement import refine
-from pcmc.plan import Divider, Plan
+from pcmc.plan import Divider, Plan, plan_from
 from pcmc.solvers.newton import NewtonOptions, newton
+from pcmc.solvers.state import SolverState
 
 
 def held(surface):
@@ -296,6 +297,59 @@ def test_a_move_past_the_bottom_comes_down_on_it():
         X[top] += move
         down = part.coming_down(X, full.vertices, 5e-3)
         assert down.sum() == down[top] == expected
+
+
+def test_a_short_move_slides_no_vertex_far_along_the_junction():
+    """To above their feet at once they went however far, and no step was short enough to lower E."""
+    full = example(6, 3.0)
+    walls = find_walls(full, held=True)
+    leaning = full.moved(full.vertices + np.where(walls.top_free, 0.2, 0.0)[:, None] * [0.0, 1.0, 0.0])
+    at = SolverState(leaning, 0.45, held=True)
+    start = at.at.X
+    for step in (1e-2, 1e-3):
+        X, down = at.displaced(step * (at.walls.top_free[:, None] * np.array([0.0, 0.0, 1.0])))
+        assert not down.any()
+        moved = np.linalg.norm(X - start, axis=1)[at.walls.top_free]
+        assert (moved > 1.2 * step).any()  # some do slide
+        assert (moved < 2.0 * step).all()
+
+
+PLANS = (  # where solving on the finer mesh needs a wall that can pinch, though none has come down
+    (
+        [
+            [0, 0],
+            [14.12, 0],
+            [14.12, 8.72],
+            [10.42, 8.72],
+            [10.42, 3.53],
+            [3.71, 3.53],
+            [3.71, 8.72],
+            [0, 8.72],
+        ],
+        [([[-0.02, 2.6026], [14.14, 2.6026]], 0.159), ([[8.1245, -0.02], [8.1245, 3.55]], 0.103)],
+        [{"tension": 2.974, "snow": 0.32}, 2.988, {"tension": 3.008, "snow": 0.15}, 2.973],
+        0.49,
+    ),
+    (
+        [[0, 0], [15.01, 0], [11.24, 8.2], [4.08, 8.2]],
+        [
+            ([[4.6164, -0.0198], [3.5357, 7.1318]], 1.917),
+            ([[4.064, 3.6357], [1.4116, 2.8702]], 0.751),
+            ([[14.0066, 2.2182], [2.7687, 5.6087]], 0.226),
+        ],
+        [4.362, 4.417, {"tension": 4.366, "snow": 0.52, "pressure": 1.04}, 4.302, 4.437],
+        0.5,
+    ),
+)
+
+
+@pytest.mark.parametrize(("outline", "lines", "patches", "length"), at_night(*PLANS))
+def test_a_roof_that_needs_a_wall_to_pinch_on_a_finer_mesh_persists(outline, lines, patches, length):
+    dividers = [{"curve": curve, "wall": wall} for curve, wall in lines]
+    settings = {f"p{k + 1}": p if isinstance(p, dict) else {"tension": p} for k, p in enumerate(patches)}
+    plan = {"outline": outline, "dividers": dividers, "edge_length": length, "patches": settings}
+    check = check_mesh(solve(plan_from(plan).surface()))
+    assert check.persists, check.detail
 
 
 @pytest.mark.parametrize(("n", "alpha_aux", "count"), [(8, 3.0, 7), *at_night((16, 2.0, 2))])

@@ -13,6 +13,8 @@ from pcmc.forces.wall_rows import find_walls
 from pcmc.meshing.local_refinement import refine_faces, refine_near
 from pcmc.meshing.quality import edge_lengths
 from pcmc.meshing.refinement import refine
+from pcmc.meshing.remeshing import remesh
+from pcmc.plan import Divider, Plan, circle
 from pcmc.surface.geometry import angles
 
 SHAPES = {
@@ -128,6 +130,35 @@ def test_a_pinched_wall_is_refined_where_it_rests():
     again = pcmc.solve(fine, "newton", target="stationary")
     assert again.converged
     assert standing_part(again.surface).resting.sum() > resting.sum()
+
+
+def resting_roof(curve, *more):
+    """A roof whose strong walls with held bottoms rest all along."""
+    dividers = [Divider(line, wall=2.5) for line in (curve, *more)]
+    plan = Plan([[0, 0], [12, 0], [12, 8], [0, 8]], dividers, edge_length=0.8, tension=2.0, pressure=0.4)
+    solved = pcmc.solve(plan.surface())
+    assert standing_part(solved.surface).resting.any()
+    return solved.surface
+
+
+@pytest.mark.parametrize(
+    "finer", [lambda s: refine_faces(s, np.ones(s.m, dtype=bool)), lambda s: remesh(s, 0.5)]
+)
+def test_walls_that_cross_and_rest_are_lifted_with_area(finer):
+    """Beside a crossing a vertex at rest had its place straight between two others of its triangle."""
+    solved = resting_roof([[6, 0], [6, 8]], [[0, 4], [12, 4]])
+    again = pcmc.solve(finer(solved))
+    assert again.certificate.verdict is pcmc.Verdict.STABLE
+    part = standing_part(again.surface)
+    np.testing.assert_array_equal(part.resting, part.walls.top_free)
+
+
+def test_vertices_over_a_held_bottom_stay_pairs_however_often_they_are_cut():
+    """From the second level on the bottom was not cut below the junction, which could not come down again."""
+    solved = resting_roof(circle([6, 4], 2))
+    again = pcmc.solve(refine_near(solved, solved.vertices[standing_part(solved).resting][0], 3, 1.5))
+    assert again.certificate.verdict is pcmc.Verdict.STABLE
+    assert standing_part(again.surface).resting.sum() > standing_part(solved).resting.sum()
 
 
 def test_what_it_refuses():
