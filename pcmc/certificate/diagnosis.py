@@ -219,17 +219,21 @@ def worst_face(surface: Surface, left_out: Bools) -> tuple[int, float]:
 def folded_over(surface: Surface, pinchable: Bools) -> str:
     """Names a patch, not a wall that can pinch, with a triangle on the back of another; else empty.
 
-    Their normals turn by more than ``FOLDED`` at an edge that is neither held nor a cable's. Patches without
-    tension and weight are left out: their area counts for nothing.
+    Their normals turn by more than ``FOLDED`` at an edge that is neither held nor a cable's, inside a patch
+    or between two, whose sheets may meet with opposite sides. Patches without tension and weight are left
+    out: their area counts for nothing.
     """
     topo, counts = surface.topology, (surface.tensions != 0.0) | (surface.weights != 0.0)
-    free = ~(topo.seam_edge | (surface.fixed[topo.edges[:, 0]] & surface.fixed[topo.edges[:, 1]]))
+    free = ~(surface.fixed[topo.edges[:, 0]] & surface.fixed[topo.edges[:, 1]])
     free[topo.edge_numbers(surface.cable_edges.ends)] = False
     free[topo.edges_of((pinchable | ~counts)[surface.patch_of_face])] = False
     sides = topo.neighbours[free[topo.valence == 2]]
     (one, other), vectors = sides.T // 3, area_vectors(surface.vertices[surface.faces])
     sizes = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
     cosines = np.einsum("ij,ij->i", vectors[one], vectors[other])
+    start = surface.faces[sides // 3, (sides % 3 + 1) % 3]
+    # where both run along the edge in one direction, they show opposite sides
+    cosines = np.where(start[:, 0] == start[:, 1], -cosines, cosines)
     back = cosines < np.cos(np.radians(FOLDED)) * sizes[one] * sizes[other]
     if not back.any():
         return ""

@@ -173,6 +173,20 @@ def test_a_flat_sail_with_triangles_on_their_backs_is_not_certified():
     assert certify(sail.moved([*rim, [3.9, 2, 0]])).certified
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_fold_along_a_seam_of_two_patches_is_seen(turned):
+    """One sheet in two patches, of which one may show its other side: only folded it is named."""
+    X = [[0, 0, 0], [2, 0, 0], [4, 0, 0], [4, 4, 0], [2, 4, 0], [0, 4, 0], [4.5, 2, 0], [2, 2, 0]]
+    F = [[0, 1, 7], [7, 4, 5], [5, 0, 7], [1, 6, 7], [7, 6, 4], [1, 2, 6], [2, 3, 6], [3, 4, 6]]
+    patch = [0, 0, 0, 1, 1, 2, 3, 2]
+    faces = [f[::-1] if turned and part == 3 else f for f, part in zip(F, patch, strict=True)]
+    patches = [Patch(name, 1.0, 0.0) for name in "abcd"]
+    folded = Surface(X, faces, patch, patches, fixed=range(6))
+    assert "is folded near" in folded_over(folded, np.zeros(4, dtype=bool))
+    flat = folded.moved([*X[:6], [3.5, 2, 0], X[7]])
+    assert folded_over(flat, np.zeros(4, dtype=bool)) == ""
+
+
 def test_a_steep_tent_and_a_folded_wall_without_tension_are_not_folded_over():
     """No triangle of the tent, of 14° at its ridge, lies on another; the wall has no area that counts."""
     eaves, ridge = [[0, 0, 0], [6, 0, 0], [6, 1, 0], [0, 1, 0]], [[0, 0.5, 4], [6, 0.5, 4]]
