@@ -108,7 +108,7 @@ def _needs(module: str, name: str) -> tuple[tuple[str, str], ...]:
     if name not in named:
         return tuple(_imports(tree, module))
     nodes = [node for node in (named[name], *_loose(_path(module))) if not isinstance(node, IMPORT)]
-    used = {part.id for node in nodes for part in ast.walk(node) if isinstance(part, ast.Name)} | {name}
+    used = {name}.union(*map(_names_in, nodes))
     imports = [_with_names(node, used) for node in tree.body if isinstance(node, IMPORT)]
     own = {other for other in used & named.keys() if not isinstance(named[other], IMPORT)}
     return (*((module, other) for other in own), *_imports(ast.Module([*imports, *nodes], []), module))
@@ -136,7 +136,7 @@ def _reached(tree: ast.Module, starts: frozenset[str]) -> ast.Module:
         name = waiting.pop()
         if name in named and name not in used:
             used.add(name)
-            waiting += [part.id for part in ast.walk(named[name]) if isinstance(part, ast.Name)]
+            waiting += _names_in(named[name])
     body: list[ast.stmt] = []
     for node in tree.body:
         if isinstance(node, IMPORT):
@@ -183,7 +183,7 @@ def _imports(tree: ast.Module, module: str) -> Iterator[tuple[str, str]]:
     """The names of other modules of this checkout that a module's code imports: (module, name or ALL)."""
     package = module if _path(module).name == "__init__.py" else module.rpartition(".")[0]
     modules = {}  # by the name that stands for one here
-    nodes = list(_run(tree))
+    nodes = [part for statement in tree.body for part in _run(statement)]
     for node in nodes:
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -208,15 +208,21 @@ def _imports(tree: ast.Module, module: str) -> Iterator[tuple[str, str]]:
             yield modules[node.id], ALL
 
 
-def _run(tree: ast.AST) -> Iterator[ast.AST]:
-    """All nodes but those that only a type checker reads."""
-    waiting = [tree]
+@cache
+def _run(statement: ast.stmt) -> list[ast.AST]:
+    """Its nodes but those that only a type checker reads."""
+    found, waiting = list[ast.AST](), list[ast.AST]([statement])
     while waiting:
         node = waiting.pop()
-        if _for_types(node):
-            continue
-        yield node
-        waiting += ast.iter_child_nodes(node)
+        if not _for_types(node):
+            found.append(node)
+            waiting += ast.iter_child_nodes(node)
+    return found
+
+
+@cache
+def _names_in(statement: ast.stmt) -> frozenset[str]:
+    return frozenset(part.id for part in ast.walk(statement) if isinstance(part, ast.Name))
 
 
 def _absolute(node: ast.ImportFrom, package: str) -> str:

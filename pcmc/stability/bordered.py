@@ -6,6 +6,8 @@ preconditions GMRES. Where J is singular, as at a fold, the bordered matrix is n
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
@@ -31,11 +33,15 @@ class BorderedFactor:
         self._inner, self._rows, self._behind = inner, rows, inner(columns)
         self.schur = corner - rows @ self._behind  # (k,k)
 
+    @cached_property
+    def _small(self) -> Floats:
+        return np.asarray(np.linalg.pinv(self.schur), dtype=np.float64)
+
     def solve(self, right: Floats) -> Floats:
         """(s, μ) (N+k,) with A s + P μ and Q s + D μ as given in ``right``, or several of them (N+k,j)."""
         size = len(self._behind)
         s = self._inner(right[:size])
-        multipliers = np.linalg.pinv(self.schur) @ (right[size:] - self._rows @ s)
+        multipliers = self._small @ (right[size:] - self._rows @ s)
         return np.concatenate([s - self._behind @ multipliers, multipliers])
 
 

@@ -41,7 +41,9 @@ def columns_at_rest(model: StructuralModel) -> pd.DataFrame:
     reactions: Floats = model.certificate.reactions.copy()
     if model.beams and model.bars:
         frame, vertices = frame_of(model, model.standing.vertices)
-        reactions[vertices] = frame.solved(forces_on_members(model, model.steps[0])[vertices]).reactions
+        forces = forces_on_members(model, model.steps[0])[vertices] / np.bincount(vertices)[vertices, None]
+        reactions[vertices] = 0.0
+        np.add.at(reactions, vertices, frame.solved(forces).reactions)
     return column_table(model, [(model.steps[0].name, reactions)])
 
 

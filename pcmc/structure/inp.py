@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -69,9 +69,7 @@ def text_of(
     notes += [f"SUPPORT_{label}: {kind}, {name}" for label, kind, name in supports]
     text += map(_comment, [*notes, *(f"step {k}: {step.name}" for k, step in enumerate(steps, 1))])
     text += [card("NODE, NSET=NALL", nodes + 1, surface.vertices[nodes] / unit)]
-    number = np.arange(1, surface.n + 1)  # of the nodes of members: their own where they are tied
-    number[model.tied] = model.surface.n + 1 + np.arange(len(model.tied))
-    text += chain(_elements(model, number, unit), _beams(model, number, unit), _ties(model, number))
+    text += chain(_elements(model, unit), _beams(model, unit), _ties(model))
     text += _supports(model)
     # σ = α/t (I - ν ν) in each element, ν its normal: uniform in its plane; τ/a t t along a cable's edge
     prestress = [(model.faces + 1, model.stresses, POINTS)]
@@ -86,7 +84,7 @@ def text_of(
     return "".join(chain(text, *(_step(model, step, k == 0, every, unit) for k, step in enumerate(steps))))
 
 
-def _elements(model: StructuralModel, number: Ints, unit: float) -> Iterator[str]:
+def _elements(model: StructuralModel, unit: float) -> Iterator[str]:
     """Elements, node sets, materials and sections by patch and by cable."""
     surface, (name, section, _) = model.standing, KINDS[model.elements]
     patch_of = surface.patch_of_face[model.active]
@@ -106,7 +104,8 @@ def _elements(model: StructuralModel, number: Ints, unit: float) -> Iterator[str
             yield f"*{section} SECTION, ELSET={one}, MATERIAL=PATCH_{k}, ORIENTATION={one}\n{thickness}\n"
     yield "*ELSET, ELSET=EALL\n" + "".join(f"PATCH_{k + 1},\n" for k in np.unique(patch_of))
     for k, (cable, area, material, numbers, _) in enumerate(model.cable_edges(), 1):
-        ends = number[cable.edges] if model.elements == "shell" else cable.edges + 1
+        own = surface.n + 1 + np.searchsorted(np.unique(model.member_nodes[0]), cable.edges)
+        ends = own if model.elements == "shell" else cable.edges + 1
         yield card(f"ELEMENT, TYPE=T3D2, ELSET=CABLE_{k}", numbers, ends)
         yield _material(f"CABLE_{k}", material, unit)
         yield f"*SOLID SECTION, ELSET=CABLE_{k}, MATERIAL=CABLE_{k}\n{short(area / unit**2)}\n"
@@ -114,17 +113,20 @@ def _elements(model: StructuralModel, number: Ints, unit: float) -> Iterator[str
         yield "*ELSET, ELSET=CABLES\n" + "".join(f"CABLE_{k + 1},\n" for k in range(len(surface.cables)))
 
 
-def _beams(model: StructuralModel, number: Ints, unit: float) -> Iterator[str]:
+def _beams(model: StructuralModel, unit: float) -> Iterator[str]:
     """Beams, as rectangles with the stiffness of their profiles."""
     X, up = model.standing.vertices, np.array(model.surface.plane.normal)
-    if len(model.tied):
-        yield card("NODE, NSET=MEMBERS", number[model.tied], X[model.tied] / unit)
+    (nodes, places), last = model.member_nodes, model.surface.n
+    if len(nodes):
+        yield card("NODE, NSET=MEMBERS", last + 1 + np.arange(len(nodes)), X[nodes] / unit)
     first = model.surface.m + 1 + sum(len(cable.edges) for cable in model.standing.cables)
-    for k, line in enumerate(model.beams, 1):
+    for k, (line, of) in enumerate(zip(model.beams, places, strict=True), 1):
         elements, first = first + np.arange(len(line.pairs)), first + len(line.pairs)
         width, height, factor = line.member.profile.equal_rectangle
         yield _comment(f"MEMBER_{k}: {line.name}")
-        yield card(f"ELEMENT, TYPE=B31, ELSET=MEMBER_{k}", elements, number[line.pairs])
+        yield card(
+            f"ELEMENT, TYPE=B31, ELSET=MEMBER_{k}", elements, last + 1 + np.stack([of[:-1], of[1:]], axis=1)
+        )
         for a, (row, those) in enumerate(_alike(bar_axes(X, line.pairs, up)[0][:, 1]), 1):
             yield _set(f"MEMBER_{k}_{a}", elements[those] - 1, "ELSET")
             yield f"*BEAM SECTION, ELSET=MEMBER_{k}_{a}, MATERIAL=MEMBER_{k}, SECTION=RECT\n"
@@ -133,29 +135,31 @@ def _beams(model: StructuralModel, number: Ints, unit: float) -> Iterator[str]:
         yield _material(f"MEMBER_{k}", replace(m, young=factor * m.young, density=factor * m.density), unit)
 
 
-def _ties(model: StructuralModel, number: Ints) -> Iterator[str]:
+def _ties(model: StructuralModel) -> Iterator[str]:
     """What ties the nodes of members to those of the sheets, and holds their ends. Where membranes and beams,
     or shells and cables, share nodes, the constraints that CalculiX makes for them contradict each other from
     one increment to the next, or it stops with "code 255"."""
     turns = held_turns(model, model.standing.vertices)
-    for v, node in zip(model.tied.tolist(), number[model.tied].tolist(), strict=True):
+    nodes = model.member_nodes[0]
+    for k, v in enumerate(nodes.tolist()):
+        node = model.surface.n + 1 + k
         stops = {0: "123", 1: "23", 2: "1", 3: ""}[model.freedom[v] if model.held[v] else 3]
-        if v in turns or stops not in ("", "123"):
+        if k in turns or stops not in ("", "123"):
             axes = model.axes[v]
-            if v in turns:  # those that are held first
-                held = _stopped_about(model, v, turns[v])
+            if k in turns:  # those that are held first
+                held = _stopped_about(model, k, turns[k])
                 axes = held if len(held) > 1 else np.concatenate([held, *perpendicular(held)])
             yield f"*NSET, NSET=BEAM_{node}\n{node}\n"
             yield card(f"TRANSFORM, NSET=BEAM_{node}, TYPE=R", axes[:2].reshape(1, 6))
         yield "".join(f"*BOUNDARY\n{node},{axis},{axis}\n" for axis in stops)
-        if v in turns:
-            yield f"*BOUNDARY\n{node},4,{3 + len(turns[v])}\n"
+        if k in turns:
+            yield f"*BOUNDARY\n{node},4,{3 + len(turns[k])}\n"
         for axis in sorted({"1", "2", "3"} - set(stops)):
             yield f"*EQUATION\n2\n{node},{axis},1.,{v + 1},{axis},-1.\n"
-    yield _set("ENDS", number[model.tied[model.held[model.tied]]] - 1)
+    yield _set("ENDS", model.surface.n + np.flatnonzero(model.held[nodes]))
 
 
-def _stopped_about(model: StructuralModel, v: int, turns: Floats) -> Floats:
+def _stopped_about(model: StructuralModel, node: int, turns: Floats) -> Floats:
     """(k,3) the axes about which CalculiX has to stop turns, to stop those about ``turns`` (k,3). Where one
     bar ends alone, with the section b · h, it stops the mean turn of the section's corners r about an axis a,
 
@@ -163,14 +167,17 @@ def _stopped_about(model: StructuralModel, v: int, turns: Floats) -> Floats:
 
     x along the bar, z upright: the components of a are those of the turn over these shares.
     """
-    bars = [(line, pair) for line in model.beams for pair in line.pairs if v in pair]
+    bars = [
+        (line, pair)
+        for line, of in zip(model.beams, model.member_nodes[1], strict=True)
+        for pair, ends in zip(line.pairs, pairwise(of), strict=True)
+        if node in ends
+    ]
     if len(turns) > 1 or len(bars) > 1:
         return turns
     (line, pair), up = bars[0], np.array(model.surface.plane.normal)
-    axes, b, h = (
-        bar_axes(model.standing.vertices, pair[None], up)[0][0],
-        *line.member.profile.equal_rectangle[:2],
-    )
+    axes = bar_axes(model.standing.vertices, pair[None], up)[0][0]
+    b, h, _ = line.member.profile.equal_rectangle
     return unit_vectors((turns @ axes.T / [1.0, h**2 / (b**2 + h**2), b**2 / (b**2 + h**2)]) @ axes)
 
 
@@ -242,7 +249,7 @@ def _step(model: StructuralModel, step: Step, form: bool, every: bool, unit: flo
     elif not form:
         yield f"*CLOAD, OP=NEW\n{int(np.flatnonzero(model.nodes)[0]) + 1},1,0.\n"
     printed = {"NODE PRINT, NSET=NALL": "U"} | {f"EL PRINT, ELSET={name}": "S" for name in sets}
-    for name, held in (("HELD", model.held), ("ENDS", model.held[model.tied])):
+    for name, held in (("HELD", model.held), ("ENDS", model.held[model.member_nodes[0]])):
         printed |= {f"NODE PRINT, NSET={name}": "RF"} if held.any() else {}
     for what, quantity in printed.items():
         yield f"*{what}, GLOBAL=YES, FREQUENCY={1 if every else 1000}\n{quantity}\n"

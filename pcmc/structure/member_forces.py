@@ -108,7 +108,7 @@ def members_in(
     X, forces = model.standing.vertices, forces_on_members(model, step, results)
     moved = np.zeros_like(X) if results is None else np.nan_to_num(results.displacements)
     frame, vertices = frame_of(model, X + moved)
-    solved = frame.solved(forces[vertices])
+    solved = frame.solved(forces[vertices] / np.bincount(vertices)[vertices, None])
     if results is None:
         moved[vertices] = solved.displacements
     found, first = list[MemberForces](), 0
@@ -141,10 +141,11 @@ def forces_on_members(model: StructuralModel, step: Step, found: StepResults | N
 
 
 def frame_of(model: StructuralModel, X: Floats) -> tuple[BarFrame, Ints]:
-    """The beams of a model as a frame at X (n,3), and the vertices (k,) that its points are."""
-    pairs, vertices = [line.pairs for line in model.beams], model.beam_vertices
-    place = np.full(len(X), -1)
-    place[vertices] = np.arange(len(vertices))
+    """The beams of a model as a frame at X (n,3), and the vertices (k,) that its points are, some of them
+    several times: see ``StructuralModel.member_nodes``."""
+    nodes, places = model.member_nodes
+    used = np.unique(np.concatenate(places))
+    vertices, pairs = nodes[used], [np.stack([of[:-1], of[1:]], axis=1) for of in places]
     stiffness = list[list[float]]()
     for line in model.beams:
         E, profile = line.member.material.young, line.member.profile
@@ -152,30 +153,34 @@ def frame_of(model: StructuralModel, X: Floats) -> tuple[BarFrame, Ints]:
         stiffness.append([E * value for value in (profile.area, *profile.moments, shear)])
     of_bars = np.repeat(np.array(stiffness), list(map(len, pairs)), axis=0)
     rows, turns = list[Floats](), held_turns(model, X)
-    for v in vertices[model.held[vertices]].tolist():
+    for k in np.flatnonzero(model.held[vertices]).tolist():
+        v = vertices[k]
         stopped = (slice(0, 3), slice(1, 3), slice(0, 1))[model.freedom[v]]
-        for kind, held in enumerate((model.axes[v][stopped], turns.get(v, ()))):
+        for kind, held in enumerate((model.axes[v][stopped], turns.get(int(used[k]), ()))):
             for direction in held:
                 row = np.zeros((len(vertices), 2, 3))  # the displacement and the turn of each
-                row[place[v], kind] = direction
+                row[k, kind] = direction
                 rows.append(row.ravel())
     holds = np.array(rows).reshape(-1, 6 * len(vertices))
     normal = np.array(model.surface.plane.normal)
-    return BarFrame(X[vertices], place[np.concatenate(pairs)], of_bars, holds, normal), vertices
+    return BarFrame(
+        X[vertices], np.searchsorted(used, np.concatenate(pairs)), of_bars, holds, normal
+    ), vertices
 
 
 def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:
-    """By the vertices at fixed ends of beams, the turns (k,3) that are held there, as unit vectors at right
-    angles: the twist of hinged ends on X (n,3), all of clamped ones."""
+    """By the ``member_nodes`` at fixed ends of beams, the turns (k,3) that are held there, as unit vectors at
+    right angles: the twist of hinged ends on X (n,3), all of clamped ones."""
     given = dict[int, list[Floats]]()
-    for line in (line for line in model.beams if not line.closed):
+    for line, places in zip(model.beams, model.member_nodes[1], strict=True):
         t, length = directions(X, line.pairs)
-        for v, two in ((line.vertices[0], slice(2)), (line.vertices[-1], slice(None, -3, -1))):
-            if model.held[v] and model.freedom[v] == 0:
+        for end, two in ((0, slice(2)), (-1, slice(None, -3, -1))):
+            v = line.vertices[end]
+            if not line.closed and model.held[v] and model.freedom[v] == 0:
                 clamped = line.member.ends == "clamped"
                 turns = np.eye(3) if clamped else end_tangent(t[two], length[two])[None]
-                given.setdefault(int(v), []).extend(turns)
-    return {v: orth(np.array(held).T, ALIKE).T for v, held in given.items()}
+                given.setdefault(int(places[end]), []).extend(turns)
+    return {node: orth(np.array(held).T, ALIKE).T for node, held in given.items()}
 
 
 def supports_with_members(results: StepResults) -> pd.DataFrame:

@@ -216,12 +216,22 @@ class StructuralModel:
         """The vertices of beams."""
         return np.unique([v for beam in self.beams for v in beam.vertices.tolist()]).astype(np.int64)
 
-    @cached_array
-    def tied(self) -> Ints:
-        """The vertices where beams, and the cables of shells, have nodes of their own, tied to those of the
-        sheets. Their numbers come after the vertices'."""
+    @cached_property
+    def member_nodes(self) -> tuple[Ints, list[Ints]]:
+        """The vertices (k,) where beams, and the cables of shells, have nodes of their own, tied to those of
+        the sheets, with numbers after the vertices'; and of each beam the places (b+1,) of its points there.
+        At a fixed vertex each beam with a hinged end has its own, to bend without those beside it."""
         cables = self.standing.cables if self.elements == "shell" else ()
-        return np.unique(np.concatenate([self.beam_vertices, *(cable.edges.ravel() for cable in cables)]))
+        tied = np.unique(np.concatenate([self.beam_vertices, *(cable.edges.ravel() for cable in cables)]))
+        bars = np.bincount([v for beam in self.beams for v in beam.pairs.ravel()], minlength=self.surface.n)
+        vertices, places = tied.tolist(), list[Ints]()
+        for beam in self.beams:
+            places.append(np.searchsorted(tied, np.append(beam.pairs[:, 0], beam.pairs[-1, 1])))
+            for end in (0, -1) if beam.member.ends == "hinged" and not beam.closed else ():
+                if self.held[v := beam.vertices[end]] and self.freedom[v] == 0 and bars[v] > 1:
+                    places[-1][end], bars[v] = len(vertices), bars[v] - 1
+                    vertices.append(int(v))
+        return np.array(vertices, dtype=np.int64), places
 
     @cached_property
     def lines(self) -> tuple[PlacedMember, ...]:

@@ -155,7 +155,8 @@ def _results(model: StructuralModel, steps: Sequence[Step], k: int, tables: list
     if "forces" in blocks:
         reactions[blocks["forces"].ids - 1] = blocks["forces"].values
         if "ends" in blocks:  # of members, at nodes of their own
-            reactions[model.tied[blocks["ends"].ids - 1 - surface.n]] += blocks["ends"].values
+            ends = model.member_nodes[0][blocks["ends"].ids - 1 - surface.n]
+            np.add.at(reactions, ends, blocks["ends"].values)
         reactions -= model.nodal_loads(step, np.nan_to_num(displacements))
         reactions[~model.held] = 0.0
         reactions -= np.einsum("nij,nj->ni", model.allowed, reactions)

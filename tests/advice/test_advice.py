@@ -22,7 +22,7 @@ from pcmc.plan import Divider, PatchSpec, Plan
 from pcmc.plan.plan import Chosen
 from pcmc.project import firmer, load, run_project
 
-HALL = "[plan]\nedge_length = 0.8\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
+HALL = "[plan]\nedge_length = 1.1\noutline = [[0, 0], [12, 0], [12, 6], [0, 6]]\n"
 SEAM = "curve = [[6, 0], [6, 6]]\n"
 CHANCEL = f'[[plan.dividers]]\nname = "chancel"\n{SEAM}'
 WRONG = {

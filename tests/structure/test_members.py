@@ -54,6 +54,28 @@ def test_a_beam_whose_end_slides_along_it_bends_as_one_with_both_ends_held():
     assert rolls.displacements[:, 1:] == pytest.approx(held.displacements[:, 1:], abs=1e-12)
 
 
+@pytest.mark.parametrize("program", [False, pytest.param(True, marks=needs_ccx)])
+def test_hinged_beams_that_meet_at_a_corner_bend_as_each_alone(program):
+    """Rigidly joined, the twist that the one holds would clamp the other."""
+    corners = [[0, 0], [6, 0], [6, 4], [0, 4]]
+    roof = pcmc.solve(Plan(corners, edge_length=1.0, tension=4.0).surface()).surface
+    edges = [
+        Member(polyline([corners[k - 1], corners[k]]), TUBE, Material(2.1e10), name=f"edge {k}")
+        for k in range(4)
+    ]
+
+    def found(members):
+        model = model_of(roof, members=members)
+        return analyse(model, remedy=False).cases[0].members if program else members_at_rest(model)
+
+    for alone, beside in zip((found([edge])[0] for edge in edges), found(edges), strict=True):
+        assert beside.deflection == pytest.approx(alone.deflection, rel=0.01)
+        assert np.abs(beside.within[[0, -1], 4:]).max() < 1e-6 * np.abs(beside.within[:, 4:]).max()
+    model = model_of(roof, members=edges)
+    nodes, places = model.member_nodes
+    assert len(nodes) == sum(map(len, places)) == len(np.unique(nodes)) + 4
+
+
 def test_a_hinge_of_a_curved_beam_holds_its_twist_about_the_tangent_with_order_two():
     off = []
     for n in (8, 16, 32):

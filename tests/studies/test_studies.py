@@ -79,14 +79,13 @@ def test_large_figures_shrink_and_small_ones_stay_as_all_of_a_short_run(tmp_path
     assert sizes[False]["small"] == sizes[True]["small"]
 
 
-def test_shrunken_figures_keep_rare_colours(tmp_path):
+def test_shrunken_figures_keep_rare_colours(tmp_path, monkeypatch):
     from PIL import Image
 
-    rows, columns = np.mgrid[0:300, 0:450]
+    monkeypatch.setattr("studies.folder.LARGE", 10_000)
+    rows, columns = np.mgrid[0:100, 0:150]
     rng = np.random.default_rng(1)
-    picture = np.stack([rows // 3, columns // 4, 200 + rng.integers(0, 50, rows.shape)], axis=2).astype(
-        np.uint8
-    )
+    picture = np.stack([rows, columns, 200 + rng.integers(0, 50, rows.shape)], axis=2).astype(np.uint8)
     picture[10:16, 10:16] = rare = (238, 136, 102)  # as in a legend
     folder = Folder(tmp_path)
     Image.fromarray(picture).save(folder.figure("a"))

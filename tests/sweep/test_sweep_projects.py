@@ -133,11 +133,13 @@ def test_the_file_is_read_once_and_meshed_for_names_alone(roof, monkeypatch):
 
 
 def test_numbers_that_the_file_leaves_out_vary_too(roof):
-    values = {"plan.rise": 0.7, "plan.patches.west.snow": 0.2, "plan.dividers.1.cable": 2.0}
+    values = {"plan.patches.east.weight": 0.1, "plan.patches.west.snow": 0.2, "plan.dividers.1.cable": 2.0}
     project = varied(roof, values | {"solve.iterations": 7})[0]
     plan = project.plan
-    assert (plan.rise, plan.patches[0].snow, plan.dividers[0].cable) == (0.7, 0.2, 2.0)
+    assert (plan.patches[1].weight, plan.patches[0].snow, plan.dividers[0].cable) == (0.1, 0.2, 2.0)
     assert project.options["iterations"] == 7
+    with refused(FileError, what="plan.rise"):  # it was the height of the start shape, and changed no roof
+        varied(roof, {"plan.rise": 0.7})
 
 
 def test_a_case_is_what_the_project_with_these_numbers_gives(roof):
