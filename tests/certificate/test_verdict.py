@@ -190,9 +190,8 @@ def test_a_fold_along_a_seam_of_two_patches_is_seen(turned):
 def test_a_seam_where_a_cell_goes_on_may_show_the_other_side():
     """A flat strip of two patches, of which one is turned over; they also meet across the cell."""
     X = [[x, y, 0] for x in range(5) for y in range(3)]
-    F = [[k, k + 3, k + 4] for k in range(11) if k % 3 < 2] + [
-        [k, k + 4, k + 1] for k in range(11) if k % 3 < 2
-    ]
+    low = [k for k in range(11) if k % 3 < 2]
+    F = [[k, k + 3, k + 4] for k in low] + [[k, k + 4, k + 1] for k in low]
     patch = [int(min(face) >= 6) for face in F]
     faces = [face[::-1] if part else face for face, part in zip(F, patch, strict=True)]
     held, images = [k for k in range(15) if k % 3 != 1], [[12 + k, k] for k in range(3)]
