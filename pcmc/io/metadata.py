@@ -228,8 +228,9 @@ def with_parts(data: MeshData) -> MeshData:
     except DAMAGED:
         raise _damaged(str(dict(parts))) from None
     try:
-        topo = topology(data.faces, data.patch_of_face, len(X))
-        checked_curves(curves, X, topo, fixed, bounding_size(X))
+        if curves:
+            topo = topology(data.faces, data.patch_of_face, len(X))
+            checked_curves(curves, X, topo, fixed, bounding_size(X))
     except SurfaceError:
         lost[CURVES_LOST], curves = None, ()
     notes = (*data.notes, *([f"{', '.join(lost)}: {CHANGED}"] if lost else []))

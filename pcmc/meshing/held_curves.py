@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Bools, Floats, Ints
 from ..surface import Surface
-from .refinement import CORNER, Projection, held_midpoints
+from ..surface.geometry import CORNER
+from .refinement import Projection, held_midpoints
 
 HALVINGS = 8  # of each edge of a curve that points are projected onto
 NEAREST = 3  # pieces of curve that are compared

@@ -13,11 +13,10 @@ from ..base.errors import OptionError
 from ..base.tolerances import ON
 from ..forces.pinching import standing_part, under_low
 from ..surface import Surface, expect_surface
+from ..surface.geometry import CORNER
 from ..surface.held_curve import HeldCurve
 from ..surface.images import expect_no_images
 from ..surface.lagrange import middles_of_sides
-
-CORNER = 40.0  # degrees: where held edges turn by more, their line has a corner
 
 Projection = Callable[[Floats], Floats]
 

@@ -207,13 +207,13 @@ class _Writer(NamedTuple):
             return
         whole = "drawing" not in plan and not plan.get("patches")  # the plan has one value for all patches
         if shared and (whole or key in plan) and len({getattr(p, key) for p in patches}) == 1:
-            if key == "tension" and key not in plan:
+            if key == "tension":
                 _drop(plan, WHOLE)
             plan[key] = _number(next(iter(wanted.values())))
             return
         tables = plan.setdefault("patches", {})
+        _drop(plan, WHOLE)  # each patch has its own tension now
         if whole:
-            _drop(plan, () if "tension" in plan else WHOLE)
             usual = USUAL | {"snow": plan.get("snow", 0.0)}
             for patch in patches:
                 own = {name: _number(getattr(patch, name)) for name in usual}

@@ -18,6 +18,8 @@ from ..base.arrays import Floats, Ints, Vector
 from ..base.compiled import compiled, inlined
 from ..base.tolerances import FAR
 
+CORNER = 40.0  # degrees: where held edges turn by more, their line has a corner
+
 
 @inlined
 def point(X: Floats, i: int) -> Vector:
@@ -170,11 +172,14 @@ def unit_vectors(v: Floats) -> Floats:
 
 def end_tangent(t: Floats, lengths: Floats) -> Floats:
     """(3,) the tangent at the end of a polyline, of length 1, from the directions t (k,3) and lengths (k,) of
-    its last edge and the one before, if there is one: the first turns on by its share of their bend.
+    its last edge and the one before, if there is one: the first turns on by its share of their bend, if
+    that is no corner.
 
     >>> end_tangent(np.array([[1.0, 0, 0], [0.8, -0.6, 0]]), np.array([1.0, 2.0])).round(3).tolist()
     [0.983, 0.184, 0.0]
     """
+    if t[0] @ t[-1] < np.cos(np.radians(CORNER)):
+        return t[0]
     return unit_vectors(t[0] + (t[0] - t[-1]) * lengths[0] / lengths.sum())
 
 

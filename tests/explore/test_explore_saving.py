@@ -260,7 +260,8 @@ def test_the_page_follows_the_file_and_survives_a_broken_save(tmp_path):
         until(lambda: news()["version"] == 2, "the file again")
 
 
-def test_a_drawing_that_a_project_refers_to_is_followed(tmp_path):
+@pytest.mark.parametrize("line", ["", "rise = 1.5\n"])
+def test_a_drawing_that_a_project_refers_to_is_followed(line, tmp_path):
     ezdxf = pytest.importorskip("ezdxf")
 
     def draw(width):
@@ -272,7 +273,7 @@ def test_a_drawing_that_a_project_refers_to_is_followed(tmp_path):
 
     draw(8)
     path = tmp_path / "roof.toml"
-    path.write_text('[plan]\ndrawing = "hall.dxf"\nedge_length = 1.0\n')
+    path.write_text('[plan]\ndrawing = "hall.dxf"\nedge_length = 1.0\n' + line)
     with followed(path) as running:
         draw(11)
         until(lambda: running.version == 1, "the new drawing")
@@ -281,3 +282,4 @@ def test_a_drawing_that_a_project_refers_to_is_followed(tmp_path):
         plan = tomllib.loads(saving.project_with(running.roof, surface)[0])["plan"]
         assert plan["drawing"] == "hall.dxf"
         assert [area["tension"] for area in plan["patches"].values()] == [9.0]
+        assert "rise" not in plan

@@ -94,6 +94,14 @@ def test_a_hinge_of_a_curved_beam_holds_its_twist_about_the_tangent_with_order_t
     assert np.polyfit(np.log([8, 16, 32]), np.log(off), 1)[0] < -1.9
 
 
+def test_a_hinge_beside_a_corner_holds_the_twist_about_its_own_bar():
+    film = square(4, tension=2.0)
+    bent = Member(polyline([[0, 0.25], [0, 0], [1, 0]]), TUBE, STEEL)
+    held = held_turns(model_of(film, members=[bent], anyway=True), film.vertices)
+    about = {tuple(film.vertices[v, :2].tolist()): abs(turns[0]) for v, turns in held.items()}
+    assert about == {(0.0, 0.25): pytest.approx([0.0, 1.0, 0.0]), (1.0, 0.0): pytest.approx([1.0, 0.0, 0.0])}
+
+
 @needs_ccx
 @pytest.mark.parametrize("profile", [Profile.tube(0.3, 0.02), Profile(0.08, 1.07e-3, 2.67e-4)])
 def test_the_program_lets_a_curved_beam_bend_at_its_hinges_as_the_frame_does(profile):
