@@ -68,7 +68,7 @@ def threads() -> int:
 
 
 def blocks(count: int, workers: int | None = None) -> list[tuple[int, int]]:
-    """Cut ``count`` triangles into equal ranges, one a worker (by default ``threads``), of at least BLOCK each.
+    """Cut ``count`` triangles into equal ranges of at least BLOCK, one a worker; by default ``threads``.
 
     >>> blocks(100_000, 2)
     [(0, 50000), (50000, 100000)]
