@@ -227,13 +227,12 @@ def folded_over(surface: Surface, pinchable: Bools) -> str:
     free = ~(surface.fixed[topo.edges[:, 0]] & surface.fixed[topo.edges[:, 1]])
     free[topo.edge_numbers(surface.cable_edges.ends)] = False
     free[topo.edges_of((pinchable | ~counts)[surface.patch_of_face])] = False
-    sides = topo.neighbours[free[topo.valence == 2]]
-    (one, other), vectors = sides.T // 3, area_vectors(surface.vertices[surface.faces])
+    free &= topo.valence == 2
+    one, other = topo.neighbours[free[topo.valence == 2]].T // 3
+    vectors = area_vectors(surface.vertices[surface.faces])
     sizes = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
     cosines = np.einsum("ij,ij->i", vectors[one], vectors[other])
-    start = surface.faces[sides // 3, (sides % 3 + 1) % 3]
-    # where both run along the edge in one direction, they show opposite sides
-    cosines = np.where(start[:, 0] == start[:, 1], -cosines, cosines)
+    cosines *= np.where(topo.one_way_edge[free], -1.0, 1.0)  # there they show opposite sides
     back = cosines < np.cos(np.radians(FOLDED)) * sizes[one] * sizes[other]
     if not back.any():
         return ""

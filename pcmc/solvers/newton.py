@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.errors import CurvedContactError, SurfaceError
 from ..base.tolerances import POOR
-from ..certificate.diagnosis import describe_saddle, slipping_ends, slipping_rings
+from ..certificate.diagnosis import describe_saddle, held_wall_down, slipping_ends, slipping_rings
 from ..forces.functional import energy
 from ..forces.rooms import check_rooms, prescribed_volumes, room_pressures, room_volumes
 from ..forces.wall_rows import find_walls
@@ -96,7 +96,10 @@ def _solve_level(
 ) -> NewtonRun:
     """Solve on one mesh; where that fails, once more so that junctions can rest on held bottoms."""
     end = _attempts(NewtonRun(surface, options, log, level, rows))
-    if end.status not in LOST or not find_walls(surface, held=True).held.any():
+    lost = end.status in LOST
+    if lost and surface.periodic:  # where walls that can pinch are refused
+        lost = held_wall_down(end.state.result_surface(), end.state.walls.pinchable)
+    if not (lost and find_walls(surface, held=True).held.any()):
         return end
     again = _attempts(NewtonRun(surface, options, log, level, end.rows, held=True))
     return again if again.status in (Status.CONVERGED, Status.SADDLE, Status.STOPPED) else end

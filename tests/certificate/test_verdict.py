@@ -187,6 +187,18 @@ def test_a_fold_along_a_seam_of_two_patches_is_seen(turned):
     assert folded_over(flat, np.zeros(4, dtype=bool)) == ""
 
 
+def test_a_seam_where_a_cell_goes_on_may_show_the_other_side():
+    """A flat strip of two patches, of which one is turned over; they also meet across the cell."""
+    X = [[x, y, 0] for x in range(5) for y in range(3)]
+    low = [k for k in range(11) if k % 3 < 2]
+    F = [[k, k + 3, k + 4] for k in low] + [[k, k + 4, k + 1] for k in low]
+    patch = [int(min(face) >= 6) for face in F]
+    faces = [face[::-1] if part else face for face, part in zip(F, patch, strict=True)]
+    held, images = [k for k in range(15) if k % 3 != 1], [[12 + k, k] for k in range(3)]
+    patches = [Patch(name, 1.0, 0.0) for name in "ab"]
+    assert certify(Surface(X, faces, patch, patches, fixed=held, images=images)).verdict is Verdict.STABLE
+
+
 def test_a_steep_tent_and_a_folded_wall_without_tension_are_not_folded_over():
     """No triangle of the tent, of 14° at its ridge, lies on another; the wall has no area that counts."""
     eaves, ridge = [[0, 0, 0], [6, 0, 0], [6, 1, 0], [0, 1, 0]], [[0, 0.5, 4], [6, 0.5, 4]]

@@ -7,6 +7,7 @@ import shapes
 import volume_cases
 from exact_energy import Frozen, negative
 from flint import arb
+from held_walls import example
 from motion_cases import SURFACES
 
 import generators
@@ -21,7 +22,6 @@ from pcmc.forces.pinching import pull_and_capacity, standing_part
 from pcmc.forces.second_variation import assemble
 from pcmc.stability.equilibrium import Equilibrium
 from studies.forces.cases import hanging_barrel
-from tests.forces.test_contact_held import example
 from tests.surface import test_lines
 
 CASES = {

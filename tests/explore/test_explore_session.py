@@ -268,7 +268,7 @@ def test_a_surface_that_nothing_brings_to_rest_is_shown_as_it_was_given():
 
 
 def test_another_file_leaves_no_search_behind(cap):
-    session = Session(cap)
+    session = Session(solved_start(spherical_cap(edge_length=0.5)))
     assert session.equilibria("pressure") is session.found
     assert session.visit(1).certificate.verdict is Verdict.SADDLE
     with refused(OptionError, what="number", found=10_000):

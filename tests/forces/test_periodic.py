@@ -10,7 +10,7 @@ from refusals import refused
 import pcmc
 from generators import kelvin_foam, minimal_cell, weaire_phelan_foam
 from generators.cells import LATTICES
-from pcmc import Patch, Room
+from pcmc import Patch, Room, Surface
 from pcmc.base.errors import SurfaceError
 from pcmc.certificate import Verdict
 from pcmc.diagnostics import check_gradient, check_hessian
@@ -195,6 +195,20 @@ def test_a_bay_between_images_is_that_between_mirrors():
     assert np.isnan(moment).all()  # the forces across the seam have moments
     assert "moments" not in str(one.certificate)
     assert len(one.certificate.supports) == 2
+
+
+def test_a_wall_that_cannot_balance_says_so_also_between_images():
+    """That a wall which comes down is not for a periodic surface would be no reason here."""
+    roof = bay(4)
+    top = np.flatnonzero(roof.vertices[:, 1] == 0.5)
+    a, b, c, d = top[:-1], top[1:], roof.n + np.arange(1, 5), roof.n + np.arange(4)
+    X = np.concatenate([roof.vertices, roof.vertices[top] * [1, 1, 0]])
+    F = np.concatenate([roof.faces, np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    patch = (roof.vertices[roof.faces, 1].mean(axis=1) > 0.5).tolist() + 8 * [2]
+    patches = [Patch("left", 1.0, -0.3), Patch("right", 3.0, -0.3), Patch("wall", 0.1, 0.0, wall=True)]
+    fixed, images = [*np.flatnonzero(roof.fixed), *range(roof.n, len(X))], pcmc.images_in(X, [[1, 0, 0]])
+    found = pcmc.solve(Surface(X, F, patch, patches, fixed, images=images)).certificate
+    assert found.verdict is Verdict.NO_EQUILIBRIUM, found.detail
 
 
 def test_the_height_of_a_vault_without_end():

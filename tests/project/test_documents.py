@@ -59,7 +59,7 @@ def test_one_command_writes_what_other_programs_read(tmp_path, monkeypatch, caps
     plan = (
         ROOF.read_text(encoding="utf-8")
         .split("[output]")[0]
-        .replace("edge_length = 0.7", "edge_length = 1.6")
+        .replace("edge_length = 0.7", "edge_length = 2.4")
     )
     (tmp_path / "roof.toml").write_text(UNITS + plan + STRUCTURE + EVERYTHING, encoding="utf-8")
     assert cli.main(["solve", "roof.toml"]) == 0

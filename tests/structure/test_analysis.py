@@ -119,7 +119,7 @@ def test_a_barrel_under_snow_follows_its_section():
 def test_what_is_too_much_is_answered():
     """The share reached, the place, and a prestress that was tried; a remedy scales the carried load."""
     heavy = model_of(
-        cap(0.1), material=Material(1e5), thickness=THICK, loads=[Snow(1.4), Snow(0.3, name="light")]
+        cap(0.17), material=Material(1e5), thickness=THICK, loads=[Snow(1.8), Snow(0.3, name="light")]
     )
     found = analyse(heavy)
     assert [case.carried for case in found.cases] == [True, False, True]
@@ -129,7 +129,7 @@ def test_what_is_too_much_is_answered():
     assert found["light"].taut == 1.0
     taut = found["snow"].taut
     assert 0.0 < taut < found["snow"].share
-    at_taut = analyse(replace(heavy, loads=[Snow(taut * 1.4)]))["snow"].results.principal_forces
+    at_taut = analyse(replace(heavy, loads=[Snow(taut * 1.8)]))["snow"].results.principal_forces
     assert abs(np.nanmin(at_taut)) < 0.03 * ALPHA
     first, mesh, last = found.answers()
     assert mesh == analysis.MESH
@@ -137,7 +137,7 @@ def test_what_is_too_much_is_answered():
     assert "'cap'" in first
     assert last.startswith("tried: ")
     total = found["snow"].results.reactions.sum(axis=0)[2]
-    at_share = np.pi * (found["snow"].share * 1.4 - 1.0)
+    at_share = np.pi * (found["snow"].share * 1.8 - 1.0)
     assert total == pytest.approx(at_share, rel=0.05)
 
 

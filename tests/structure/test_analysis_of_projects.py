@@ -59,7 +59,7 @@ def test_the_command_ends_with_1_for_a_case_that_is_not_carried(tmp_path, monkey
 @needs_ccx
 def test_cases_are_run_without_a_file_and_one_that_is_not_carried_ends_with_1(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    pcmc.write("cap.pcmc", pcmc.solve(spherical_cap(0.2, alpha=ALPHA)).surface)
+    pcmc.write("cap.pcmc", pcmc.solve(spherical_cap(0.3, alpha=ALPHA)).surface)
     text = 'mesh = "cap.pcmc"\n[structure]\nyoung = 1e4\nthickness = 0.001\nsnow = 2.0\nrun = true\n'
     (tmp_path / "cap.toml").write_text(text)
     assert cli.main(["solve", "cap.toml", "--no-mesh-check"]) == 1

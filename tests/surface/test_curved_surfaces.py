@@ -61,7 +61,7 @@ def test_only_flat_triangles_rest_on_the_plane():
     assert (result.converged, result.surface.order) == (True, 1)
     assert "its triangles are flat, though order=2 was asked for: the junction comes" in result.message
     assert result.certificate.certified
-    resting = refine(solve(two_squares(alpha_aux=4.0)).surface)
+    resting = refine(solve(two_squares(4, alpha_aux=4.0)).surface)
     with pytest.raises(
         SurfaceError, match=r"^order: the junction comes down to the plane at vertex \d+, and"
     ):

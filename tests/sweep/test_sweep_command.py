@@ -26,6 +26,7 @@ GRID = ["west.tension=3,3.2", "wall 1.tension=0.5,0.8"]
 
 def test_the_command_makes_a_table(roof, capsys):
     given = ["sweep", "roof.toml", *GRID, "east.tension=3.1", "--csv", "t.csv", "--store", "s"]
+    given += ["--workers", "1"]
     assert cli.main([*given, "--all", "--plot", "t.png"]) == 0
     shown = capsys.readouterr().out
     table = pd.read_csv("t.csv")
