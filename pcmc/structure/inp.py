@@ -159,7 +159,7 @@ def _ties(model: StructuralModel) -> Iterator[str]:
     fixed = np.unique(model.standing.cable_edges.ends)
     fixed = fixed[model.held[fixed] & (model.freedom[fixed] == 0)]
     if turns and len(fixed) and model.elements != "shell":
-        # without axes at such ends of cables CalculiX may let the held turns of beams there go, without a word
+        # without axes at such ends of cables CalculiX may let the held turns of beams there go
         yield _set("CABLE_ENDS", fixed)
         yield card("TRANSFORM, NSET=CABLE_ENDS, TYPE=R", np.eye(3)[:2].reshape(1, 6))
     yield _set("ENDS", model.surface.n + np.flatnonzero(model.held[nodes]))
