@@ -67,15 +67,17 @@ def threads() -> int:
     return max(1, min(8, usable or 1))
 
 
-def blocks(count: int, workers: int) -> list[tuple[int, int]]:
-    """Cut ``count`` triangles into equal ranges, one a worker, each of at least BLOCK triangles.
+def blocks(count: int, workers: int | None = None) -> list[tuple[int, int]]:
+    """Cut ``count`` triangles into equal ranges of at least BLOCK, one a worker; by default ``threads``.
 
     >>> blocks(100_000, 2)
     [(0, 50000), (50000, 100000)]
-    >>> blocks(1000, 2)
+    >>> blocks(1000)
     [(0, 1000)]
     """
-    parts = max(1, min(workers, count // BLOCK))
+    parts = max(1, count // BLOCK)
+    if parts > 1:  # asking the system for processors takes as long as the loops of a small mesh
+        parts = min(parts, workers or threads())
     return [(count * k // parts, count * (k + 1) // parts) for k in range(parts)]
 
 
@@ -84,19 +86,19 @@ def sum_blocks(work: Callable[[int, int, Any], None], count: int, shape: tuple[i
 
     They are added in order: the same number of workers gives the same bytes.
     """
-    out = [np.zeros(shape) for _ in blocks(count, threads())]
-    run_blocks(lambda part, first, last: work(first, last, out[part]), count, None)
+    out = [np.zeros(shape) for _ in blocks(count)]
+    run_blocks(lambda part, first, last: work(first, last, out[part]), count)
     for other in out[1:]:
         out[0] += other
     return out[0]
 
 
-def run_blocks(work: Callable[[int, int, int], None], count: int, workers: int | None) -> int:
+def run_blocks(work: Callable[[int, int, int], None], count: int, workers: int | None = None) -> int:
     """Call ``work(part, first, last)`` for each block, on threads if there are several; return how many.
 
     The first block is done by the caller: its processor is awake, and the others' threads go elsewhere.
     """
-    first, *others = blocks(count, workers or threads())
+    first, *others = blocks(count, workers)
     if not others:
         work(0, *first)
         return 1

@@ -25,7 +25,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import Floats, Ints
-from ..base.compiled import blocks, compiled, run_blocks, threads
+from ..base.compiled import blocks, compiled, run_blocks
 from ..surface import Surface
 from ..surface.geometry import accumulate, cross, dot, norm, point, scaled, sub, vector
 from .curved import measure_elements
@@ -79,7 +79,7 @@ def totals_and_gradient(
     order: the same number of workers gives the same bytes, and a mesh under two BLOCKs the same bytes on
     every machine.
     """
-    parts = len(blocks(len(mesh.faces), workers or threads()))
+    parts = len(blocks(len(mesh.faces), workers))
     plain = not (mesh.curved or mesh.weight.any())
     sums = np.zeros((parts, 3, len(mesh.tension)))
     gradient = [np.zeros((0, 3) if sums_alone else X.shape) for _ in range(parts)]

@@ -172,6 +172,8 @@ def _improve(X: Floats, star: Ints, v: int) -> bool:
     """Move vertex v to the best of the places around it; whether it moved."""
     corner = X[star]
     normal = area_vectors(corner).sum(axis=0)
+    if not normal.any():  # as where a sheet lies on itself
+        return False
     first = X[star[0][star[0] != v][0]] - X[v]
     first = first - (first @ normal) / (normal @ normal) * normal
     length = np.linalg.norm(first)

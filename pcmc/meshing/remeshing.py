@@ -20,7 +20,6 @@ from ..surface import Surface
 from ..surface.geometry import angles, area_vectors, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import two_digits
-from ..surface.supports import members
 from ..surface.topology import SIDES, edge_places
 from .curve_cutting import CurveMesh, check_sizes, cut_curves, limit_growth, sizes_at, triangles_for
 from .quality import edge_lengths, improve_angles
@@ -122,9 +121,7 @@ def raised(surface: Surface) -> Surface:
         return surface
     walls, rows = part.walls, part.walls.rows
     lifted = lift(surface, walls, part.resting, RAISED)
-    inner = mask_of(rows.vertices[rows.relative_height > 0.0], surface.n) & ~members(
-        surface.on_planes, surface.n
-    )
+    inner = mask_of(rows.vertices[rows.relative_height > 0.0], surface.n) & ~surface.held
     faces = surface.faces[walls.pinchable[surface.patch_of_face]]
     return lifted.moved(improve_angles(lifted.vertices, faces, inner, FLAT_ANGLE))
 

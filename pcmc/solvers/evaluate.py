@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import Bools, Floats
-from ..base.compiled import blocks, compiled, threads
+from ..base.compiled import blocks, compiled
 from ..base.tolerances import FORCE_ROUNDING
 from ..forces import triangles
 from ..forces.elements import add_values, energy_mesh
@@ -73,7 +73,7 @@ class Evaluator:
         self._others = tuple((plane, mask) for plane, mask in surface.sliding if mask is not surface.on_plane)
         self._surface = surface
         self._more = any(True for _ in elements(surface, surface.vertices))
-        self._single = len(blocks(surface.m, threads())) == 1 and not (self._mesh.curved or surface.heavy)
+        self._single = len(blocks(surface.m)) == 1 and not (self._mesh.curved or surface.heavy)
 
     def row(self, point: Point) -> dict[str, Any]:
         """The point as a row of a solver's history."""

@@ -13,7 +13,7 @@ from pcmc import Patch, Surface, solve
 from pcmc.base.errors import MissingExtra, OptionError
 from pcmc.forces.functional import patch_areas
 from pcmc.meshing.curve_cutting import CurveMesh, cut_curves
-from pcmc.meshing.quality import edge_lengths, minimum_angle
+from pcmc.meshing.quality import edge_lengths, improve_angles, minimum_angle
 from pcmc.meshing.refinement import refine
 from pcmc.meshing.remeshing import _remesh_with_mmg, remesh, size_note
 from pcmc.plan import Plan
@@ -267,3 +267,9 @@ def test_new_triangles_keep_the_side_that_a_pressure_pushes_to():
     finer = remesh(solve(lens()).surface, 0.2)
     roof = solve(finer).surface
     assert roof.vertices[:, 2].min() == pytest.approx(-roof.vertices[:, 2].max(), rel=0.02)
+
+
+def test_a_vertex_where_a_sheet_lies_on_itself_stays():
+    X = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.25, 0.5, 0]])
+    fan = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    assert (improve_angles(X, np.concatenate([fan, fan[:, ::-1]]), np.arange(5) == 4, goal=40.0) == X).all()
