@@ -14,6 +14,7 @@ from structures import model_of, scaled, square
 
 import pcmc
 from pcmc import Circle, Material, SelfWeight, Snow
+from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.io.mesh_data import scaled_surface
 from pcmc.plan import Divider, Plan, circle, polyline
@@ -100,6 +101,16 @@ def test_a_hinge_beside_a_corner_holds_the_twist_about_its_own_bar():
     held = held_turns(model_of(film, members=[bent], anyway=True), film.vertices)
     about = {tuple(film.vertices[v, :2].tolist()): abs(turns[0]) for v, turns in held.items()}
     assert about == {(0.0, 0.25): pytest.approx([0.0, 1.0, 0.0]), (1.0, 0.0): pytest.approx([1.0, 0.0, 0.0])}
+
+
+def test_shells_with_a_cable_that_meets_a_beam_are_refused():
+    """The program makes a hinge of the node that both have: the beam moved 900 times as far."""
+    corners = [[0, 0], [6, 0], [6, 4], [0, 4]]
+    ridge = Divider([[3, 0], [3, 4]], wall=False, cable=1.0)
+    roof = Plan(corners, [ridge], edge_length=1.0, tension=4.0).surface()
+    edge = Member(polyline(corners[:2]), TUBE, STEEL)
+    with pytest.raises(OptionError, match=r"^elements: in shells a cable would be a hinge of 'member'"):
+        model_of(roof, members=[edge], cable_area=1e-3, elements="shell", anyway=True)
 
 
 @needs_ccx
