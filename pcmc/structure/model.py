@@ -286,17 +286,15 @@ class StructuralModel:
     @cached_array
     def nodes(self) -> Bools:
         """(n,) the vertices of elements."""
-        s, beams = self.standing, self.beam_vertices
-        used = np.concatenate([s.faces[self.active].ravel(), beams, s.cable_edges.ends.ravel()])
-        return mask_of(used, s.n)
+        s = self.standing
+        used = s.faces[self.active].ravel(), self.beam_vertices, s.cable_edges.ends.ravel()
+        return mask_of(np.concatenate(used), s.n)
 
     @cached_array
     def on_members(self) -> Bools:
         """(n,) the vertices that members carry in the place of walls and supports."""
-        on = np.zeros(self.surface.n, dtype=bool)
-        for line in self.lines:
-            on[line.vertices] = True
-        return on & ~self.held
+        on = [np.empty(0, int), *(line.vertices for line in self.lines)]
+        return mask_of(np.concatenate(on), self.surface.n) & ~self.held
 
     @cached_array
     def freed(self) -> Ints:
