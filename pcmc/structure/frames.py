@@ -78,7 +78,7 @@ class BarFrame:
         >>> round(column.buckling(np.array([-1.0, -1.0])) / np.pi**2, 3)
         1.008
         """
-        if not (N < 0.0).any():
+        if not (N < 0.0).any() or len(self.holds) == self.holds.shape[1]:  # nothing is free
             return np.inf
         label = components(self.bars, len(self.points))
         mine = np.isin(label, label[self.bars[N < 0.0]])

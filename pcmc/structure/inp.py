@@ -156,6 +156,12 @@ def _ties(model: StructuralModel) -> Iterator[str]:
             yield f"*BOUNDARY\n{node},4,{3 + len(turns[k])}\n"
         for axis in sorted({"1", "2", "3"} - set(stops)):
             yield f"*EQUATION\n2\n{node},{axis},1.,{v + 1},{axis},-1.\n"
+    fixed = np.unique(model.standing.cable_edges.ends)
+    fixed = fixed[model.held[fixed] & (model.freedom[fixed] == 0)]
+    if turns and len(fixed) and model.elements != "shell":
+        # without axes at such ends of cables CalculiX may let the held turns of beams there go
+        yield _set("CABLE_ENDS", fixed)
+        yield card("TRANSFORM, NSET=CABLE_ENDS, TYPE=R", np.eye(3)[:2].reshape(1, 6))
     yield _set("ENDS", model.surface.n + np.flatnonzero(model.held[nodes]))
 
 

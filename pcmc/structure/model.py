@@ -125,6 +125,10 @@ class StructuralModel:
         vars(self)["combinations"] = check_combinations(self.combinations, self.loads)
         self.bars  # noqa: B018
         of_lines = [line.member.material for line in self.beams] + [of for _, of in self.cable_sections]
+        cables = self.standing.cable_edges.ends if self.elements == "shell" else ()
+        for line in (line for line in self.beams if np.isin(cables, line.vertices).any()):
+            text = f"elements: in shells a cable would be a hinge of {line.name!r}, which it meets"
+            raise OptionError(f"{text}; take membranes", what="elements", found="shell")
         if self.weights and not any(material.density for material in (*self.materials, *of_lines)):
             validate.refuse("Material.density", 0.0, "a finite number > 0", hint="SelfWeight needs it")
         known = self.certificate or getattr(solved, "certificate", None)

@@ -95,7 +95,7 @@ def test_an_export_is_the_file_that_the_command_writes(tmp_path, text, suffix):
 def test_an_export_that_misses_the_targets_is_marked(client):
     name = client.ask("/api/open")[0]["session"]
     assert "TARGETS" not in client.explorer.export(name, ".obj")[1].decode()
-    client.ask(f"/api/{name}/settle", {"tensions": {"west": 9.0}})
+    client.ask(f"/api/{name}/settle", {"tensions": {"west": 4.0}})
     assert client.explorer.export(name, ".obj")[1].decode().splitlines()[1] == "# TARGETS NOT MET"
 
 

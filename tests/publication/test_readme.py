@@ -48,7 +48,9 @@ def test_commands_of_the_table_run_in_order_on_the_project_above(leave_out, tmp_
     words = "solve certify remesh convert plot sweep panels draw structure report explore"
     assert [line.split()[0] for line in lines] == words.split(" ")
     for line in lines[:-1]:
-        assert cli.main(shlex.split(line.replace(leave_out, ""))) == 0, capsys.readouterr().err
+        given = shlex.split(line.replace(leave_out, ""))
+        given += ["--workers", "1"] * (leave_out != "" and given[0] == "sweep")  # one process, not two
+        assert cli.main(given) == 0, capsys.readouterr().err
     files = ["roof.pcmc", "fine.pcmc", "roof.3dm", "error.png", "walls.csv"]
     for name in (*files, "panels.csv", "sheets.dxf", "roof.inp", "report.pdf"):
         assert (tmp_path / name).stat().st_size > 0

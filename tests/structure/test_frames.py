@@ -61,6 +61,8 @@ def test_a_column_buckles_under_eulers_load_to_the_fourth_order():
     clamped = frame_along(straight(16), [(end, k) for end in (0, -1) for k in range(6)])
     assert clamped.buckling(np.full(16, -2.0)) == pytest.approx(4.0 * euler / 2.0, rel=1e-4)
     assert clamped.buckling(np.ones(16)) == np.inf
+    one_bar = frame_along(straight(1), [(end, k) for end in (0, -1) for k in range(6)])
+    assert one_bar.buckling(np.array([-1.0])) == np.inf
     both = BarFrame(
         np.concatenate([straight(8), straight(8) + 5.0 * UP]),
         np.concatenate([frame_along(straight(8)).bars + first for first in (0, 9)]),

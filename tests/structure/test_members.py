@@ -14,9 +14,10 @@ from structures import model_of, scaled, square
 
 import pcmc
 from pcmc import Circle, Material, SelfWeight, Snow
+from pcmc.base.errors import OptionError
 from pcmc.base.units import Units
 from pcmc.io.mesh_data import scaled_surface
-from pcmc.plan import Plan, circle, polyline
+from pcmc.plan import Divider, Plan, circle, polyline
 from pcmc.structure import Member, Profile, analyse
 from pcmc.structure.frames import turns
 from pcmc.structure.inp import text_of
@@ -100,6 +101,30 @@ def test_a_hinge_beside_a_corner_holds_the_twist_about_its_own_bar():
     held = held_turns(model_of(film, members=[bent], anyway=True), film.vertices)
     about = {tuple(film.vertices[v, :2].tolist()): abs(turns[0]) for v, turns in held.items()}
     assert about == {(0.0, 0.25): pytest.approx([0.0, 1.0, 0.0]), (1.0, 0.0): pytest.approx([1.0, 0.0, 0.0])}
+
+
+def test_shells_with_a_cable_that_meets_a_beam_are_refused():
+    """The program makes a hinge of the node that both have: the beam moved 900 times as far."""
+    corners = [[0, 0], [6, 0], [6, 4], [0, 4]]
+    ridge = Divider([[3, 0], [3, 4]], wall=False, cable=1.0)
+    roof = Plan(corners, [ridge], edge_length=1.0, tension=4.0).surface()
+    edge = Member(polyline(corners[:2]), TUBE, STEEL)
+    with pytest.raises(OptionError, match=r"^elements: in shells a cable would be a hinge of 'member'"):
+        model_of(roof, members=[edge], cable_area=1e-3, elements="shell", anyway=True)
+
+
+@needs_ccx
+@pytest.mark.parametrize("ends", ["hinged", "clamped"])
+def test_the_program_holds_the_turns_of_a_curved_beam_where_a_cable_ends_too(ends):
+    angle = np.linspace(0.15, 0.85, 15) * np.pi
+    arc = 5.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    outline = [*arc.tolist(), [arc[-1, 0], 0.0], [arc[0, 0], 0.0]]
+    ridge = Divider([outline[0], outline[-2]], wall=False, cable=1.0)
+    roof = pcmc.solve(Plan(outline, [ridge], edge_length=1.0, tension=4.0).surface()).surface
+    bow = Member(polyline(arc.tolist()), Profile.tube(0.3, 0.02), Material(2.1e10), ends=ends)
+    model = model_of(roof, members=[bow], cable_area=1e-3)
+    [alone], [within] = members_at_rest(model), analyse(model, remedy=False).cases[0].members
+    assert within.deflection == pytest.approx(alone.deflection, rel=0.03)
 
 
 @needs_ccx

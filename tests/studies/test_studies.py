@@ -25,8 +25,9 @@ from studies.folder import Folder, mesh_hash
 from studies.paper import read_measured
 from studies.registry import STUDIES, chosen
 from studies.runner import run_all
-from studies.study import Study, perform
+from studies.study import perform
 from studies.worker import main as work
+from tests.studies.tiny_study import tiny_study
 
 HOME = Path(__file__).resolve().parents[2]
 
@@ -73,7 +74,7 @@ def test_large_figures_shrink_and_small_ones_stay_as_all_of_a_short_run(tmp_path
 
     sizes = {}
     for short in (True, False):
-        perform(_study(figure=figure), tmp_path, short=short, steps=["figure"])
+        perform(tiny_study(figure=figure), tmp_path, short=short, steps=["figure"])
         sizes[short] = {p.stem: p.stat().st_size for p in (tmp_path / "tiny").glob("*.png")}
     assert sizes[False]["large"] < 0.5 * sizes[True]["large"]
     assert sizes[False]["small"] == sizes[True]["small"]
@@ -105,21 +106,9 @@ def test_missing_file_says_which_study_writes_it(tmp_path):
 # ------------------------------------------------------------------------------------ steps
 
 
-def _study(name="tiny", fail="", figure=lambda folder: None):
-    def data(folder, short):
-        if fail == "data":
-            raise OptionError("no data")
-        folder.write_table("records", pd.DataFrame({"x": [1.0 if short else 2.0]}))
-
-    def table(folder):
-        return {"x": folder.read_table("records").x[0]}
-
-    return Study(name, "a test", data, table, figure, parameters={"a": 1})
-
-
 def test_steps_are_taken_in_order_and_the_provenance_is_apart_from_the_numbers(tmp_path):
     steps = []
-    perform(_study(), tmp_path, announce=steps.append)
+    perform(tiny_study(), tmp_path, announce=steps.append)
     assert steps == ["data", "table", "figure"]
     assert read_measured(tmp_path) == {"tiny.x": 2.0}
     provenance = json.loads((tmp_path / "tiny" / "provenance.json").read_text())
@@ -129,25 +118,25 @@ def test_steps_are_taken_in_order_and_the_provenance_is_apart_from_the_numbers(t
 
 
 def test_a_study_that_fails_leaves_no_numbers_of_an_earlier_run(tmp_path):
-    perform(_study(), tmp_path)
+    perform(tiny_study(), tmp_path)
     with pytest.raises(OptionError):
-        perform(_study(fail="data"), tmp_path)
+        perform(tiny_study(fail="data"), tmp_path)
     assert read_measured(tmp_path) == {}
 
 
 def test_new_data_takes_the_meshes_of_an_earlier_run_away(tmp_path):
-    perform(_study(), tmp_path)
+    perform(tiny_study(), tmp_path)
     stale = tmp_path / "tiny" / "stale.pcmc"
     stale.touch()
-    perform(_study(), tmp_path, steps=["figure"])
+    perform(tiny_study(), tmp_path, steps=["figure"])
     assert stale.exists()
-    perform(_study(), tmp_path, steps=["data", "table"])
+    perform(tiny_study(), tmp_path, steps=["data", "table"])
     assert not stale.exists()
 
 
 def test_table_alone_uses_the_records_that_are_there(tmp_path):
-    perform(_study(), tmp_path, short=True)
-    perform(_study(fail="data"), tmp_path, steps=["table"])
+    perform(tiny_study(), tmp_path, short=True)
+    perform(tiny_study(fail="data"), tmp_path, steps=["table"])
     assert read_measured(tmp_path) == {"tiny.x": 1.0}
 
 
@@ -165,7 +154,7 @@ print("table", flush=True)
 def _run(tmp_path, names):
     script = tmp_path / "worker.py"
     script.write_text(WORKER)
-    studies = [_study(name) for name in names]
+    studies = [tiny_study(name) for name in names]
     quiet = Console(quiet=True)
     return run_all(studies, tmp_path, quiet, worker=(sys.executable, str(script)))
 
