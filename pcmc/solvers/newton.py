@@ -97,7 +97,7 @@ def _solve_level(
     """Solve on one mesh; where that fails, once more so that junctions can rest on held bottoms."""
     end = _attempts(NewtonRun(surface, options, log, level, rows))
     lost = end.status in LOST
-    if lost and surface.periodic:  # where walls that can pinch are refused
+    if lost and (surface.periodic or surface.order > 1):  # where no wall can pinch
         lost = held_wall_down(end.state.result_surface(), end.state.walls.pinchable)
     if not (lost and find_walls(surface, held=True).held.any()):
         return end
