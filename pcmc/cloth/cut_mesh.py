@@ -155,12 +155,14 @@ class CutMesh:
         return self._along(place, share, path, number, name)
 
     def _crossed(self, start: int, end: int) -> str:
-        """Where a cut comes nearest to the line between two vertices, but for its ends, in words."""
-        cut = self.X[np.unique(self.cuts)] - self.X[start]
-        line = self.X[end] - self.X[start]
+        """Where a cut comes nearest to the line between two vertices, seen from above; not at its ends."""
+        cut, line = self.X[np.unique(self.cuts)] - self.X[start], self.X[end] - self.X[start]
         share = cut @ line / (line @ line)
         cut = cut[np.abs(share - 0.5) < 0.49]
-        away = np.linalg.norm(np.cross(cut, line), axis=1)
+        areas, across = area_vectors(self.X[self.F]), np.cross(cut, line)
+        above = areas.sum(axis=0)  # seen in space, a dome's points are equally far
+        open_sheet = np.linalg.norm(above) > ON * np.linalg.norm(areas)
+        away = np.abs(across @ above) if open_sheet else np.linalg.norm(across, axis=1)
         return f" near {point_text(self.X[start] + cut[away.argmin()])}" if len(cut) else ""
 
     def _along(self, place: Ints, share: Floats, path: Floats, number: int, name: str) -> CutMesh:
