@@ -66,6 +66,11 @@ class CutMesh:
         mask[self.topology.edge_numbers(self.cuts)] = True
         return mask
 
+    @property
+    def cuts_at(self) -> Ints:
+        """(n,) the number of cut edges at each vertex."""
+        return np.bincount(self.topology.edges[self.cut_edge].ravel(), minlength=len(self.X))
+
     @cached_property
     def pieces(self) -> Pieces:
         """The pieces that it falls into, each with vertices of its own."""
@@ -354,7 +359,12 @@ def with_lines(mesh: CutMesh, lines: Sequence[Floats], plane: Plane) -> CutMesh:
             if k:
                 middle = _seen(mesh, 0.5 * (point + line[k - 1]), plane)[1]
                 faces = mesh.pieces.piece == mesh.pieces.piece[middle]
+                ends = mesh.cuts_at == 1
                 mesh = mesh.with_seam(previous, vertex, first + number, name, faces)
+                if len(around := np.flatnonzero(mesh.cuts_at[: len(ends)][ends] > 2)):
+                    place = point_text(mesh.X[np.flatnonzero(ends)[around[0]]])
+                    text = f"{name}: it crosses a seam or cable that ends at {place}; end it there or move it"
+                    raise OptionError(text, what="seams", where=number)
             previous = vertex
     return mesh
 

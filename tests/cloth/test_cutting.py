@@ -239,6 +239,14 @@ def test_a_line_that_ends_inside_a_sheet_is_a_dart():
     assert pattern.largest_difference < 1e-6
 
 
+def test_a_line_across_a_dart_is_refused():
+    """It would go around the end of the dart; beside the dart it may end."""
+    dart = [[0.0, -1.0], [0.0, 0.0]]
+    with pytest.raises(OptionError, match=r"seam 2: it crosses a seam or cable that ends at \(0, 0, 0\.5"):
+        cutting_pattern(cap(), seams=[dart, [[-0.9, -0.5], [0.9, -0.5]]])
+    assert len(cutting_pattern(cap(), seams=[dart, [[-0.95, 0.3], [0.95, 0.3]]]).strips) == 2
+
+
 def test_sheets_close_over_each_other_are_cut_apart_and_a_square_one_along_x():
     X = np.array([[x, y, z] for z in (0.0, 0.01) for y in (0.0, 1.0, 2.0) for x in (0.0, 1.0, 2.0)])
     F = np.concatenate([grid(2, 2)[:, ::-1], grid(2, 2)[:, ::-1] + 9])
