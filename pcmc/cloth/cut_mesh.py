@@ -363,9 +363,10 @@ def with_lines(mesh: CutMesh, lines: Sequence[Floats], plane: Plane) -> CutMesh:
                 above = middle if len(middle) == 2 else plane.to_local(middle)[:2]
                 beside_cuts = len(middle) == 3 and len(mesh.cuts) > len(before.cuts)  # may lie in a tube
                 if not beside_cuts and _seen(before, above, plane)[2] > SNAP * reach:
-                    text = f"{name}: from {point_text(line[k - 1])} to {point_text(point)} it leaves the roof;"
-                    raise OptionError(f"{text} end it at the rim, or move it", what="seams", where=number)
-                at, more = mesh.cuts_at, mesh.cuts_at[: len(before.X)] > before.cuts_at
+                    text = f"{name}: from {point_text(line[k - 1])} to {point_text(point)} it leaves the"
+                    text += " roof; end it at the rim, or move it"
+                    raise OptionError(text, what="seams", where=number)
+                more = mesh.cuts_at[: len(before.X)] > before.cuts_at
                 more[[previous, vertex]] = False
                 if len(met := np.flatnonzero(more & (before.cuts_at > 0))):
                     text = f"{name}: between its points it meets a rim, a ridge, a cable or another seam at"
