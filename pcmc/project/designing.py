@@ -165,7 +165,7 @@ def _mesh_of(project: Project, report: OnStep) -> Outcome | None:
 def solve_from_start(
     project: Project, report: OnStep, changed: Changed | None, mesh: Outcome | None
 ) -> Outcome:
-    """Solve a project from its start shape, which is its ``mesh``, if it has one, with ``changed`` applied."""
+    """Solve a project from its start shape, its ``mesh`` where it has one, with ``changed`` applied."""
     if mesh is None:
         report("meshing the plan")
     given = mesh or start_of(project)
