@@ -131,7 +131,7 @@ class PlacedMember(EdgeCurve):
     def masses(self, X: Floats) -> Floats:
         """(n,) its mass at the vertices X (n,3): half of each bar's at its ends."""
         half = 0.5 * self.member.profile.area * self.member.material.density * segment_lengths(X, self.pairs)
-        return np.bincount(self.pairs.ravel(), np.repeat(half, 2), len(X))
+        return np.asarray(np.bincount(self.pairs.ravel(), np.repeat(half, 2), len(X)), dtype=np.float64)
 
     def texts(self, units: Units) -> dict[str, str]:
         """What it is, in words and numbers with units, by key.
