@@ -145,8 +145,10 @@ class Plane(_Placed):
         >>> [Plane().oblique_to(direction) for direction in ([1, 1, 0], [0, 0, 2], [1, 0, 1])]
         [False, False, True]
         """
-        along, square = np.linalg.norm(np.cross(direction, self._axis)), np.dot(direction, self._axis)
-        return bool(min(along, abs(square)) > 1e-6 * np.linalg.norm(direction))
+        along = np.asarray(direction, dtype=float)
+        square = along @ self._axis
+        both = np.linalg.norm(along - square * self._axis), abs(square)
+        return bool(min(both) > 1e-6 * np.linalg.norm(along))
 
     def nearest(self, points: npt.ArrayLike) -> Floats:
         """(…,3) the points of the plane nearest to points (…,3).
