@@ -239,6 +239,9 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
         about = f"at rest N = {far:.3g}{force}, M up to {M:.3g}{moment}"
         about += f", M/N = {M / abs(far):.2g}{length}" if far else ""
         stiff = f"{beam.enough:.3g} times its E A and E I keep the deflection below 1/{LIMIT:.0f} of the span"
+        if not beam.line.member.profile.shape:
+            about += f"; its torsion constant is taken as {beam.line.member.profile.torsion:.3g}{length}"
+            about += "⁴" * bool(length) + ", an ellipse's: an open section's is hundreds of times smaller"
         about += f"; {floating(model, beam, units) or f'{stiff} (the member alone)'}"
         about += f"; alone it buckles at {beam.buckling:.3g} times this" if beam.buckling < np.inf else ""
         if beam.line.wall:
