@@ -121,7 +121,8 @@ class Wind:
 
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
         by_patch, up = np.zeros(len(surface.patches)), np.array(surface.plane.normal)
-        plan = np.bincount(surface.patch_of_face, area_vectors(surface.vertices[surface.faces]) @ up)
+        areas = area_vectors(surface.vertices[surface.faces]) @ up
+        plan = np.bincount(surface.patch_of_face, areas, len(by_patch))
         down = in_the_open(surface) & (plan < -EVEN * surface.size**2)
         for name in (name for name in self.pressures if down[surface.patch_index(name)]):
             text = f"{self.name}: the triangles of {name!r} face down, so wind above 0 pushes it down and is"
