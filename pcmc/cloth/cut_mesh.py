@@ -357,13 +357,20 @@ def with_lines(mesh: CutMesh, lines: Sequence[Floats], plane: Plane) -> CutMesh:
                     place = on_rim[gap.argmin()] @ rim[gap.argmin()]
             mesh, vertex = mesh.with_vertex(place, np.ones(len(mesh.F), dtype=bool))
             if k:
-                middle = _seen(mesh, 0.5 * (point + line[k - 1]), plane)[1]
-                faces = mesh.pieces.piece == mesh.pieces.piece[middle]
-                ends = mesh.cuts_at == 1
+                middle, before = 0.5 * (point + line[k - 1]), mesh
+                faces = mesh.pieces.piece == mesh.pieces.piece[_seen(mesh, middle, plane)[1]]
                 mesh = mesh.with_seam(previous, vertex, first + number, name, faces)
-                if len(around := np.flatnonzero(mesh.cuts_at[: len(ends)][ends] > 2)):
-                    place = point_text(mesh.X[np.flatnonzero(ends)[around[0]]])
-                    text = f"{name}: it crosses a seam or cable that ends at {place}; end it there or move it"
+                above = middle if len(middle) == 2 else plane.to_local(middle)[:2]
+                beside_cuts = len(middle) == 3 and len(mesh.cuts) > len(before.cuts)  # may lie in a tube
+                if not beside_cuts and _seen(before, above, plane)[2] > SNAP * reach:
+                    text = f"{name}: from {point_text(line[k - 1])} to {point_text(point)} it leaves the"
+                    text += " roof; end it at the rim, or move it"
+                    raise OptionError(text, what="seams", where=number)
+                more = mesh.cuts_at[: len(before.X)] > before.cuts_at
+                more[[previous, vertex]] = False
+                if len(met := np.flatnonzero(more & (before.cuts_at > 0))):
+                    text = f"{name}: between its points it meets a rim, a ridge, a cable or another seam at"
+                    text += f" {point_text(mesh.X[met[0]])}; end it there, or move it"
                     raise OptionError(text, what="seams", where=number)
             previous = vertex
     return mesh

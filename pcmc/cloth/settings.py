@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -11,7 +12,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Floats
-from ..base.errors import OptionError
+from ..base.errors import LoadWarning, OptionError
 from ..surface import Surface, unfolded
 from ..surface.parts import image_names, with_images
 from .cut_mesh import nearest_places
@@ -129,12 +130,24 @@ class CuttingOptions:
         return lines
 
     def check(self, surface: Surface) -> None:
-        """Refuse names of patches that the roof does not have, before it is solved."""
+        """Refuse names of patches that the roof does not have, before it is solved; warn of a direction that
+        is another one behind a mirror plane."""
         names = [patch.name for patch in surface.patches]
         for key in BY_PATCH:
             given = getattr(self, key)
             for name in given if isinstance(given, Mapping) else ():
                 validate.choice(f"patch in {key}", name, names)
+        mirrors = [plane for plane, _ in surface.on_planes if plane.mirror]
+        for name, mirror in product(np.array(names)[surface.roof].tolist(), mirrors):
+            if (degrees := self.of_patch("direction", name)) is None:
+                continue
+            angle = np.radians(degrees)
+            if mirror.oblique_to(np.array([np.cos(angle), np.sin(angle)]) @ surface.plane.axes[:2]):
+                text = f"direction {degrees:g} of {name!r} is neither along the {mirror} nor square to it;"
+                text += " behind it the part has the image of its strips, and the whole, --whole, the same"
+                text += " direction"
+                warnings.warn(text, LoadWarning, stacklevel=3)
+                return
 
     def of_whole(self, piece: Surface, whole: Surface) -> CuttingOptions:
         """The same for the whole of a piece: patches and drawn seams hold for their images, too. OptionError

@@ -312,7 +312,9 @@ def of_material(pattern: CuttingOptions, structure: Structure | None, surface: S
         if degrees is not None:
             values["direction"][name] = degrees
     found: dict[str, Any] = {key: value for key, value in values.items() if value}
-    return replace(pattern, **found)
+    pattern = replace(pattern, **found)
+    pattern.check(surface)  # a warp of the model that is oblique to a mirror plane is named
+    return pattern
 
 
 def schedule_paths(path: Path) -> list[Path]:

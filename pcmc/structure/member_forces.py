@@ -29,6 +29,7 @@ ROUNDING = 1e-12  # of the largest force in a member: less of another is none
 ALIKE = 1e-6  # sine of the angle of two directions that are one
 LIMIT = 300.0  # the span over this is the deflection that members are asked to keep
 STRAIGHT = 0.01  # share of a member's pull that bends it: below it needs no other line
+MOST = 0.7  # share of it: above it no cable balances even a half of its square, and none is offered
 LOOSE = 1e-3  # of the largest tension of a cable: a smaller thrust is rounding
 HELPED = 0.2  # share of a member's pull: above it the sheets carry in place of one that is too weak alone
 
@@ -239,6 +240,9 @@ def sentences(model: StructuralModel, units: Units) -> list[str]:
         about = f"at rest N = {far:.3g}{force}, M up to {M:.3g}{moment}"
         about += f", M/N = {M / abs(far):.2g}{length}" if far else ""
         stiff = f"{beam.enough:.3g} times its E A and E I keep the deflection below 1/{LIMIT:.0f} of the span"
+        if not beam.line.member.profile.shape:
+            about += f"; its torsion constant is taken as {beam.line.member.profile.torsion:.3g}{length}"
+            about += "⁴" * bool(length) + ", an ellipse's: an open section's is hundreds of times smaller"
         about += f"; {floating(model, beam, units) or f'{stiff} (the member alone)'}"
         about += f"; alone it buckles at {beam.buckling:.3g} times this" if beam.buckling < np.inf else ""
         if beam.line.wall:
@@ -293,7 +297,7 @@ def cable_offers(model: StructuralModel) -> list[str]:
     for beam in beams:
         (N, share), on = beam.balance, str(beam.line.member.on)
         alone = sum(other.line.member is beam.line.member for other in beams) == 1
-        if beam.line.wall and alone and N > 0.0 and share > STRAIGHT:
+        if beam.line.wall and alone and N > 0.0 and STRAIGHT < share < MOST:
             text = f"{on}: with these lines of its divider a cable finds the shape that does not bend:"
             lines += [text, "wall = false", f"cable = {N:.4g}"]
             lines += [f'name = "{on}"'] if re.fullmatch(r"wall \d+", on) else []

@@ -128,6 +128,11 @@ class PlacedMember(EdgeCurve):
         first = np.arange(len(self.path) - 1)
         return self.path[:-1], *bar_axes(self.path, np.stack([first, first + 1], axis=1), up)
 
+    def masses(self, X: Floats) -> Floats:
+        """(n,) its mass at the vertices X (n,3): half of each bar's at its ends."""
+        half = 0.5 * self.member.profile.area * self.member.material.density * segment_lengths(X, self.pairs)
+        return np.asarray(np.bincount(self.pairs.ravel(), np.repeat(half, 2), len(X)), dtype=np.float64)
+
     def texts(self, units: Units) -> dict[str, str]:
         """What it is, in words and numbers with units, by key.
 

@@ -136,8 +136,7 @@ class StructuralModel:
 
     @property
     def weights(self) -> list[SelfWeight]:
-        single = [load for entry in self.loads for load in acting_together(entry)]
-        return [load for load in single if isinstance(load, SelfWeight)]
+        return [one for of in self.loads for one in acting_together(of) if isinstance(one, SelfWeight)]
 
     @property
     def note(self) -> str:
@@ -348,15 +347,16 @@ class StructuralModel:
         s, down = self.standing, -np.array(self.standing.plane.normal)
         X = s.vertices if displacements is None else s.vertices + displacements
         density = np.array([material.density for material in self.materials])
-        masses = (density * self.thicknesses)[s.patch_of_face] * face_areas(s.vertices[s.faces])
-        per_face = step.pressures[:, None] * area_vectors(X[s.faces]) + step.gravity * masses[:, None] * down
+        of_faces = (density * self.thicknesses)[s.patch_of_face] * face_areas(s.vertices[s.faces])
+        per_face = (
+            step.pressures[:, None] * area_vectors(X[s.faces]) + step.gravity * of_faces[:, None] * down
+        )
         forces = step.forces + vertex_sums(per_face[self.active] / 3.0, s.faces[self.active], s.n)
-        lengths = [(c.edges, area * of.density) for c, area, of, *_ in self.cable_edges()]
-        lengths += [(b.pairs, b.member.profile.area * b.member.material.density) for b in self.beams]
-        for ends, mass in lengths:  # per length
-            half = 0.5 * step.gravity * mass * segment_lengths(s.vertices, ends)
-            forces += np.bincount(ends.ravel(), np.repeat(half, 2), s.n)[:, None] * down
-        return forces
+        masses = sum((beam.masses(s.vertices) for beam in self.beams), np.zeros(s.n))
+        for cable, area, of, *_ in self.cable_edges():
+            half = 0.5 * area * of.density * segment_lengths(s.vertices, cable.edges)
+            np.add.at(masses, cable.edges, half[:, None])
+        return forces + step.gravity * masses[:, None] * down
 
 
 def expect_model(value: object) -> None:

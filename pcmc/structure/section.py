@@ -8,8 +8,6 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
-import numpy as np
-
 from ..base import validate
 from ..base.errors import LoadWarning, OptionError, unknown
 from ..plan import Plan
@@ -330,8 +328,7 @@ def _name_oblique_warps(materials: Material | Mapping[str, Material], piece: Sur
     mirrors = [plane for plane, _ in piece.on_planes if plane.mirror]
     named = materials if isinstance(materials, Mapping) else {"": materials}
     for (name, material), mirror in product(named.items(), mirrors):
-        square, along = np.cross(material.warp, mirror.normal), np.dot(material.warp, mirror.normal)
-        if material.cloth and min(np.linalg.norm(square), abs(along)) > 1e-6 * np.linalg.norm(material.warp):
+        if material.cloth and mirror.oblique_to(material.warp):
             of = f" of {name!r}" if name else ""
             text = f"warp {list(material.warp)}{of} is neither along the {mirror} nor square to it; behind it"
             text += " the part has the image of the warp, and the whole, --whole, the same direction"

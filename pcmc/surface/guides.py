@@ -139,6 +139,17 @@ class Plane(_Placed):
 
     distance = height
 
+    def oblique_to(self, direction: npt.ArrayLike) -> bool:
+        """Whether a direction (3,) is neither along the plane nor square to it: a mirror makes it another.
+
+        >>> [Plane().oblique_to(direction) for direction in ([1, 1, 0], [0, 0, 2], [1, 0, 1])]
+        [False, False, True]
+        """
+        along = np.asarray(direction, dtype=float)
+        square = along @ self._axis
+        both = np.linalg.norm(along - square * self._axis), abs(square)
+        return bool(min(both) > 1e-6 * np.linalg.norm(along))
+
     def nearest(self, points: npt.ArrayLike) -> Floats:
         """(…,3) the points of the plane nearest to points (…,3).
 

@@ -242,9 +242,28 @@ def test_a_line_that_ends_inside_a_sheet_is_a_dart():
 def test_a_line_across_a_dart_is_refused():
     """It would go around the end of the dart; beside the dart it may end."""
     dart = [[0.0, -1.0], [0.0, 0.0]]
-    with pytest.raises(OptionError, match=r"seam 2: it crosses a seam or cable that ends at \(0, 0, 0\.5"):
+    with pytest.raises(OptionError, match=r"seam 2: between its points it meets .* at \(0, 0, 0\.5"):
         cutting_pattern(cap(), seams=[dart, [[-0.9, -0.5], [0.9, -0.5]]])
     assert len(cutting_pattern(cap(), seams=[dart, [[-0.95, 0.3], [0.95, 0.3]]]).strips) == 2
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ([[1, 4], [4, 1]], r"from \(1, 4\) to \(4, 1\) it leaves the roof; end it at the rim"),
+        ([[2, 3], [3, 2]], r"from \(2, 3\) to \(3, 2\) it leaves the roof"),  # along the rim alone
+        ([[2, 3, 0], [3, 2, 0]], "it leaves the roof"),
+        ([[0, 3], [4, 1.6]], r"between its points it meets a rim, .* at \(2, 2\)"),
+    ],
+)
+def test_a_line_across_a_notch_is_refused(line, message):
+    """It would go around the corner, along the rim, and leave three strips; two lines may end there."""
+    outline = [[0, 0], [4, 0], [4, 2], [2, 2], [2, 4], [0, 4]]
+    notched = Plan(outline, edge_length=1.0, tension=2.0, pressure=0.0).surface()
+    with pytest.raises(OptionError, match=message):
+        cutting_pattern(notched, seams=[line], anyway=True)
+    both = [[[0, 3], [2, 2]], [[2, 2], [4, 1.6]], [[2, 2], [2, 4]]]  # the last along the rim
+    assert len(cutting_pattern(notched, seams=both, anyway=True).strips) == 3
 
 
 def test_sheets_close_over_each_other_are_cut_apart_and_a_square_one_along_x():

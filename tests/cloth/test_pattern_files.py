@@ -243,6 +243,28 @@ def test_seams_drawn_on_a_half_are_those_of_its_images(tmp_path, capsys):
     )
 
 
+CLOTH = "[structure]\nyoung = 1e6\nthickness = 1e-3\nweft = 5e5\nshear = 1e4\n"
+
+
+@pytest.mark.parametrize("whole", ["", "whole = true\n"])
+@pytest.mark.parametrize(
+    ("section", "told"),
+    [
+        ("strips = 2\ndirection = 30.0", 1),
+        ("strips = 2\ndirection = 90.0", 0),
+        (f"strips = 2\n{CLOTH}warp = [1, 2, 0]", 1),
+    ],
+)
+def test_a_direction_oblique_to_a_mirror_is_named_once(section, told, whole, tmp_path, capsys):
+    """The part has the image of its strips behind the mirror, the whole the same direction there."""
+    path = tmp_path / "half.toml"
+    half = "[plan]\nedge_length = 1.5\noutline = [[0, 0], [4, 0], [4, 6], [0, 6]]\ntension = 5.0\n"
+    half += f"mirrors = [[[4, 0], [4, 6]]]\n[output]\n{whole}[pattern]\n{section}\n"
+    path.write_text(half)
+    assert main(["pattern", str(path), "--units", "m", "-o", str(tmp_path / "cloth.csv")]) == 0
+    assert capsys.readouterr().err.count("is neither along the mirror plane 'mirror 1'") == told
+
+
 def test_the_command_cuts_a_project(tmp_path, capsys):
     path = tmp_path / "hall.toml"
     path.write_text(PROJECT + "[pattern]\nwidth = 3.0\nstiffness = [600, 400]\n")

@@ -66,6 +66,14 @@ def test_equal_beams_share_a_line():
     assert told[0].startswith("edge 0, edge 1: at rest N = ")
 
 
+@pytest.mark.parametrize("profile", [TUBE, Profile(5.38e-3, 8.36e-5, 6.04e-6)], ids=["tube", "I"])
+def test_the_torsion_constant_of_a_section_without_a_shape_is_told(profile):
+    """4 I I'/(I + I') = 2.25e-5 m⁴; that of an IPE 300 is 2.0e-7: a bow twists a hundred times as much."""
+    edge = Member(polyline([[0, 0], [0, 1]]), profile, STEEL)
+    [told] = sentences(model_of(square(4, tension=2.0), members=[edge], anyway=True), Units("m", "kN"))
+    assert ("torsion constant is taken as 2.25e-05 m⁴, an ellipse's" in told) == (not profile.shape)
+
+
 @needs_ccx
 def test_the_diagram_of_a_ring_comes_back_to_where_it_begins(monkeypatch):
     rim = Member(circle([0, 0], 1.0), TUBE, STEEL, propped=True, name="rim")
