@@ -178,9 +178,10 @@ class CutMesh:
         gap = np.minimum(share, 1.0 - share)
         met = np.unique(nearest[gap <= SNAP])  # both ends are among these
         crossed = gap > np.where(np.isin(nearest, met), BESIDE, SNAP)
-        passed, first = np.unique(nearest[~crossed], return_index=True)
-        loose = ~np.isin(passed, fixed)
-        X[passed[loose]] = path[~crossed][first[loose]]
+        for vertex in np.setdiff1d(nearest[~crossed], fixed).tolist():
+            parts = np.stack([path[:-1], path[1:], path[1:]], axis=1)
+            weights, away = nearest_places(parts, X[vertex])
+            X[vertex] = weights[away.argmin()] @ parts[away.argmin()]
         new = pd.factorize(place[crossed] @ np.array([len(X), 1]))[0]  # edges by number, as they come
         first = np.unique(new, return_index=True)[1]
         nodes = nearest.copy()
