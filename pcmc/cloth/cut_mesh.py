@@ -84,6 +84,12 @@ class CutMesh:
         vertex[label] = self.F.ravel()
         return Pieces(label.reshape(-1, 3), vertex, components(sides // 3, len(self.F)))
 
+    @property
+    def middles(self) -> Floats:
+        """(k,3) the middle of the corners of each piece."""
+        frame = pd.DataFrame(self.X[self.F].mean(axis=1)).groupby(self.pieces.piece).mean()
+        return frame.to_numpy()
+
     def with_points(self, ends: Ints, points: Floats) -> CutMesh:
         """The mesh with vertices at points (k,3) on different edges (k,2)."""
         number = len(self.X) + np.arange(len(ends))
@@ -285,7 +291,7 @@ def sheet_axes(P: Floats, plane: Plane, degrees: float | None) -> tuple[Floats, 
         turned = np.cos(ANGLES)[:, None] * second - np.sin(ANGLES)[:, None] * first
         widths = np.ptp(P.reshape(-1, 3) @ turned.T, axis=0)
         widths[:2] *= NARROWER ** np.array([2, 1])
-        across = turned[widths.argmin()]
+        across = turned[(widths / widths.max()).round(6).argmin()]  # of equal ones the first
     else:
         across = np.cross(normal, np.cos(np.radians(degrees)) * east + np.sin(np.radians(degrees)) * north)
         if np.linalg.norm(across) < 1e-6:
