@@ -9,11 +9,15 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pcmc.base.errors import MissingExtra, PcmcError
 
 from .registry import STUDIES, chosen, of_the_paper
 from .study import STEPS, Study
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 WIDTH = 150  # columns of tables that go to a file or a log
 HOME = Path(__file__).resolve().parent.parent
@@ -79,18 +83,22 @@ def _list(asked: argparse.Namespace) -> int:
     return 0
 
 
-def _run(studies: Sequence[Study], asked: argparse.Namespace, steps: Sequence[str]) -> int:
+def _console(stderr: bool = False) -> Console:
     try:
         from rich.console import Console
     except ImportError:
         raise MissingExtra("rich", "cli") from None
+    return Console(width=None if sys.stdout.isatty() else WIDTH, stderr=stderr)
+
+
+def _run(studies: Sequence[Study], asked: argparse.Namespace, steps: Sequence[str]) -> int:
+    console = _console()
     from .report import write_comparison
     from .runner import run_all
     from .screen import show, show_outcomes
 
     start = time.perf_counter()
     results = asked.results or (_scratch() if asked.short else HOME / "results")
-    console = Console(width=None if sys.stdout.isatty() else WIDTH)
     outcomes = run_all(studies, results, console, workers=asked.workers, short=asked.short, steps=steps)
     tables = write_comparison(results)
     show_outcomes(outcomes, console)
@@ -120,9 +128,9 @@ def _stale(asked: argparse.Namespace) -> int:
 def _check(asked: argparse.Namespace) -> int:
     from .stored import check
 
-    wrong = 0
+    wrong, console = 0, _console(stderr=True)  # lines that differ alone are the output
     for study in chosen(asked.names):
-        lines = check(study, asked.results or HOME / "results")
+        lines = check(study, asked.results or HOME / "results", console)
         wrong += len(lines)
         print("\n".join(lines) or f"{study.name}: every number is as stored")
     return 1 if wrong else 0

@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
@@ -19,8 +20,20 @@ from .study import STEPS, Study
 
 # One thread per worker: two workers share two cores, and sums have the same order in every run.
 THREADS = ("PCMC_THREADS", "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+# Kernels that every x86-64 processor has. Others round otherwise, and the answer of a roof at the edge of its
+# existence hangs on that: with its own kernels each machine would have other numbers.
+KERNELS = {"MKL_CBWR": "COMPATIBLE", "OPENBLAS_CORETYPE": "Nehalem"}
 
 WORKER = (sys.executable, "-m", "studies.worker")
+
+
+def environment(study: Study) -> dict[str, str]:
+    """The variables of a study's process: one thread, and unless its times are the answer, common kernels."""
+    variables = os.environ | dict.fromkeys(THREADS, "1")
+    if study.timed:
+        return variables
+    beyond = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+    return variables | KERNELS | {"NPY_DISABLE_CPU_FEATURES": " ".join(beyond)}
 
 
 @dataclass(frozen=True)
@@ -52,8 +65,7 @@ def run_all(
     with _progress(console) as progress, ThreadPoolExecutor(workers) as pool:
         crew = Crew(progress, steps, len(studies), worker)
         futures = [
-            pool.submit(crew.run, study.name, extra)
-            for study in sorted(studies, key=lambda study: -study.seconds)
+            pool.submit(crew.run, study, extra) for study in sorted(studies, key=lambda study: -study.seconds)
         ]
         try:
             for future in as_completed(futures):
@@ -84,14 +96,13 @@ class Crew:
     def __post_init__(self) -> None:
         self.task = self.progress.add_task("", total=self.studies * len(self.steps))
 
-    def run(self, name: str, extra: Sequence[str]) -> Outcome:
+    def run(self, study: Study, extra: Sequence[str]) -> Outcome:
         """Run one study to its end in a process."""
-        start = time.perf_counter()
+        start, name = time.perf_counter(), study.name
         command = [*self.worker, name, *extra]
-        environment = os.environ | dict.fromkeys(THREADS, "1")
         with tempfile.TemporaryFile("w+") as words:
             with subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=words, text=True, env=environment
+                command, stdout=subprocess.PIPE, stderr=words, text=True, env=environment(study)
             ) as process:
                 self.processes.add(process)
                 if self.stopped:

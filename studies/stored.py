@@ -7,16 +7,20 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from pcmc.base.arrays import Floats
+from pcmc.base.errors import PcmcError
 
 from .code import code_at, code_of
-from .study import Study, git, perform
+from .study import Study, git
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 # two runs give the same number if it differs by less than
 SAME = 1e-6  # of its size: other processors and libraries round sums otherwise
@@ -96,16 +100,20 @@ def differing(stored: Mapping[str, str], now: Mapping[str, str]) -> tuple[str, .
     return tuple(part for part in parts if stored.get(part) != now.get(part))
 
 
-def check(study: Study, results: Path) -> list[str]:
+def check(study: Study, results: Path, console: Console, **options: Any) -> list[str]:
     """Run a study anew, elsewhere; a line for each column of its tables that is not as stored in ``results``.
 
-    What it reads of other studies is what is stored.
+    What it reads of other studies is what is stored; ``options`` are those of ``run_all``.
     """
+    from .runner import run_all  # here, as it needs rich
+
     with tempfile.TemporaryDirectory() as scratch:
         anew = Path(scratch)
         for other in (path for path in results.iterdir() if path.is_dir() and path.name != study.name):
             (anew / other.name).symlink_to(other.resolve(), target_is_directory=True)
-        perform(study, anew, steps=("data", "table"))
+        (outcome,) = run_all([study], anew, console, steps=("data", "table"), **options)
+        if outcome.error:
+            raise PcmcError(f"{study.name}: {outcome.error}")
         return differences(results / study.name, anew / study.name)
 
 

@@ -35,6 +35,7 @@ class Study:
     parameters : what was chosen, for the provenance file.
     seconds : about how long it takes, so that long studies start first.
     paper : whether ``reproduce`` runs it.
+    timed : whether seconds are its answer, so that it may use all that the processor has.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Study:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 5.0
     paper: bool = True
+    timed: bool = False
 
 
 def perform(

@@ -64,7 +64,7 @@ def dxf_entities(path: str) -> dict[str, Any]:
     contents = Contents(int(document.header.get("$INSUNITS", 0)))
     unseen = {layer.dxf.name.lower() for layer in document.layers if layer.is_off() or layer.is_frozen()}
     for layer, entity in _with_blocks(document.modelspace(), None, 0):
-        if layer.lower() in unseen or entity.dxf.get("invisible", 0):
+        if layer.lower() in unseen or entity.dxf.get("invisible", 0) or getattr(entity, "is_invisible", 0):
             contents.hide(layer)
             continue
         kind, handle = entity.dxftype(), str(entity.dxf.get("handle") or "in a block")
@@ -72,7 +72,7 @@ def dxf_entities(path: str) -> dict[str, Any]:
             kind = "polyface"
         if kind == "POINT":
             contents.add(layer, kind, handle, point=tuple(entity.dxf.location))
-        elif kind in ("TEXT", "MTEXT"):
+        elif kind in ("TEXT", "MTEXT", "ATTRIB"):
             place = entity.dxf.insert if kind == "MTEXT" else entity.get_placement()[1]
             contents.add(layer, kind, handle, point=tuple(place), text=entity.plain_text())
         elif (pieces := _dxf_pieces(kind, entity)) is not None:
@@ -91,7 +91,7 @@ def _with_blocks(entities: Any, layer: str | None, depth: int) -> Iterator[tuple
             if entity.mcount > 1000:
                 raise RuntimeError(f"block reference {entity.dxf.handle} repeats {entity.mcount} times")
             for copy in entity.multi_insert() if entity.mcount > 1 else (entity,):
-                yield from _with_blocks(copy.virtual_entities(), own, depth + 1)
+                yield from _with_blocks([*copy.virtual_entities(), *copy.attribs], own, depth + 1)
         else:
             yield own, entity
 
@@ -102,6 +102,9 @@ def _dxf_pieces(kind: str, entity: Any) -> list[tuple[Any, ...]] | None:
     if kind == "LINE":
         return [("bezier", [tuple(entity.dxf.start), tuple(entity.dxf.end)])]
     if kind in ("LWPOLYLINE", "POLYLINE"):
+        if kind == "POLYLINE":  # one smoothed as a spline has its control points, too
+            frame = entity.vertices[0].SPLINE_FRAME_CONTROL_POINT if entity.vertices else 0
+            entity.vertices[:] = [vertex for vertex in entity.vertices if not vertex.dxf.flags & frame]
         parts = (_dxf_pieces(part.dxftype(), part) for part in entity.virtual_entities())
         return [piece for part in parts for piece in part or ()]
     if kind in ("ARC", "CIRCLE", "ELLIPSE"):

@@ -1,7 +1,8 @@
 """Roofs solved before, so that the next command need not solve them again.
 
 A file for each project in the user's cache folder, named after a hash of all that the roof depends on: the
-plan with the drawings that it was read from, the solver, the remeshing, the targets, the version of pcmc.
+plan with the drawings that it was read from, or the mesh as it was read, the solver, the remeshing, the
+targets, the version of pcmc.
 The environment variable ``PCMC_CACHE`` names another folder; ``PCMC_CACHE=off`` keeps nothing.
 """
 
@@ -24,8 +25,7 @@ import pandas as pd
 
 from .. import io
 from ..base.errors import FileError, LostWarning, PcmcError
-from ..base.files import atomic_write, read_bytes
-from ..base.units import Units
+from ..base.files import atomic_write
 from ..design import Design, DesignStatus
 from ..io.mesh_data import to_surface
 from ..solvers.result import Result, Status
@@ -70,9 +70,9 @@ def clear_cache() -> list[Path]:
     return removed
 
 
-def cached(project: Project) -> Outcome | None:
-    """The designed roof of a project, if it was solved before. A damaged file counts as none."""
-    path = _path(project)
+def cached(path: Path | None) -> Outcome | None:
+    """The designed roof in a file of the cache, if it was solved before; without its project and units. A
+    damaged file counts as none."""
     if path is None or not path.is_file():
         return None
     with suppress(PcmcError, OSError, KeyError, ValueError, TypeError):
@@ -84,25 +84,19 @@ def cached(project: Project) -> Outcome | None:
             targets, parameters = (pd.DataFrame(**given[name]) for name in ("targets", "parameters"))
             status, history = DesignStatus[given["status"]], pd.DataFrame()
             design = Design(status, result, targets, parameters, given["solves"], history=history)
-        units = Units(*values["units"]) if project.plan is None else project.units
-        outcome = Outcome(result, design=design, units=units, cached=True, notes=values.get("notes", ()))
+        outcome = Outcome(result, design=design, cached=True, notes=values.get("notes", ()))
         os.utime(path)
         return outcome
     return None
 
 
-def keep(project: Project, outcome: Outcome) -> None:
+def keep(path: Path | None, outcome: Outcome) -> None:
     """Put a designed roof into the cache, if it is good. A cache that cannot be written is left alone."""
-    path = _path(project)
     if path is None or not outcome.good:
         return
-    result, design, surface, units = outcome.solved, outcome.design, outcome.surface, outcome.units
+    result, design, surface = outcome.solved, outcome.design, outcome.surface
     values: dict[str, Any] = {name: getattr(result, name) for name in NUMBERS}
-    values |= {
-        "status": result.status.name,
-        "notes": list(outcome.notes),
-        "units": [units.length, units.force],
-    }
+    values |= {"status": result.status.name, "notes": list(outcome.notes)}
     if design is not None:
         tables = {name: getattr(design, name).to_dict("split") for name in ("targets", "parameters")}
         values["design"] = {"status": design.status.name, "solves": design.solves, **tables}
@@ -118,18 +112,18 @@ def keep(project: Project, outcome: Outcome) -> None:
             old.unlink(missing_ok=True)
 
 
-def _path(project: Project) -> Path | None:
-    """The file for a project; None for one that is not kept."""
+def path_for(project: Project, mesh: Outcome | None) -> Path | None:
+    """The file for a project and its mesh, as that was read: its files may have changed since. None for a
+    project that is not kept."""
     place = cache_folder()
     if place is None or not project.specified:
         return None
     sha = hashlib.sha256(_program().encode())
     try:
         sha.update(plain_bytes([getattr(project, name) for name in PARTS]))
-        if project.mesh is not None:
-            sha.update(read_bytes(project.path.parent / project.mesh.file))
-            sha.update(repr(project.units).encode())
-    except (TypeError, OSError):  # a value without a text of its own; a mesh that cannot be read
+        if mesh is not None:
+            sha.update(plain_bytes([mesh.units, *(getattr(mesh.surface, name) for name in FIELDS)]))
+    except TypeError:  # a value without a text of its own
         return None
     return place / f"{sha.hexdigest()}.pcmc"
 

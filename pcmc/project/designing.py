@@ -75,12 +75,15 @@ def designed(
     (True, ['78', '174', '150'])
     """
     project = project if isinstance(project, Project) else load(project)
-    use_cache = use_cache and changed is None
-    if use_cache and (known := cache.cached(project)) is not None:
-        return replace(known, unfold=project.output.whole, project=project)
-    outcome = solve_from_start(project, progress or ignore, changed)
-    if use_cache:
-        cache.keep(project, outcome)
+    progress = progress or ignore
+    mesh = _mesh_of(project, progress)
+    kept = cache.path_for(project, mesh) if use_cache and changed is None else None
+    if (known := cache.cached(kept)) is not None:
+        given = mesh or Outcome(None, units=project.units, project=project)
+        about = {name: getattr(given, name) for name in ("units", "project", "data")}
+        return replace(known, unfold=project.output.whole, **about)
+    outcome = solve_from_start(project, progress, changed, mesh)
+    cache.keep(kept, outcome)
     return outcome
 
 
@@ -128,7 +131,9 @@ def run_project(
     project = project if project.folder is not None else project.in_folder(project.path.parent)
     outputs = project.output.paths
     check_outputs(outputs, project.folder, inputs=project.inputs, pictures=[project.output.picture])
-    outcome = solve_from_start(project, progress, changed)
+    mesh = _mesh_of(project, progress)
+    kept = cache.path_for(project, mesh) if use_cache and changed is None and not project.swap else None
+    outcome = solve_from_start(project, progress, changed, mesh)
     if project.output.whole:
         progress("certifying the whole")
         outcome.whole  # noqa: B018 — computed here, while the progress is shown
@@ -143,17 +148,27 @@ def run_project(
             jobs = project_files(project, outcome, anyway, progress)
             with output_folder(project.folder or Path()):
                 outcome = replace(outcome, files=write_all(jobs, progress))
-    if use_cache and changed is None and not project.swap:
-        cache.keep(project, outcome)
+    cache.keep(kept, outcome)
     if check_after and project.mesh_check:
         firmer(outcome, changed, progress)
     return outcome
 
 
-def solve_from_start(project: Project, report: OnStep, changed: Changed | None) -> Outcome:
-    """Make the start shape of a project, and solve it; ``changed`` is applied to the start shape."""
-    report("reading" if project.plan is None else "meshing the plan")
-    given = start_of(project)
+def _mesh_of(project: Project, report: OnStep) -> Outcome | None:
+    """The start shape of a project that is in a file; None where the plan has to be meshed for it."""
+    if project.plan is not None:
+        return None
+    report("reading")
+    return start_of(project)
+
+
+def solve_from_start(
+    project: Project, report: OnStep, changed: Changed | None, mesh: Outcome | None
+) -> Outcome:
+    """Solve a project from its start shape, its ``mesh`` where it has one, with ``changed`` applied."""
+    if mesh is None:
+        report("meshing the plan")
+    given = mesh or start_of(project)
     start = given.changed(changed)
     project, surface = start.project or project, start.surface
     _check_wishes(project, surface, start.units)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.arrays import Bools, Floats
-from ..base.errors import OptionError, unknown
+from ..base.errors import LoadWarning, OptionError, unknown
 from ..surface import Plane, Surface
 from ..surface.checks import LARGEST, SMALLEST
 from ..surface.geometry import area_vectors, face_areas, segment_lengths, vertex_sums
@@ -19,6 +20,7 @@ from ..surface.values import in_the_open
 
 GRAVITY = 9.81  # m/s²
 FORM = "form"  # what combinations call the form-finding load
+EVEN = 1e-6  # of the size, squared: a patch with less area in the plan faces to neither side
 STEEPEST = 180.0  # degrees: a face that looks down
 
 
@@ -118,7 +120,13 @@ class Wind:
         return tuple(self.pressures)
 
     def added_to(self, step: Step, surface: Surface, standard: float) -> Step:
-        by_patch = np.zeros(len(surface.patches))
+        by_patch, up = np.zeros(len(surface.patches)), np.array(surface.plane.normal)
+        areas = area_vectors(surface.vertices[surface.faces]) @ up
+        plan = np.bincount(surface.patch_of_face, areas, len(by_patch))
+        down = in_the_open(surface) & (plan < -EVEN * surface.size**2)
+        for name in (name for name in self.pressures if down[surface.patch_index(name)]):
+            text = f"{self.name}: the triangles of {name!r} face down, so wind above 0 pushes it down and is"
+            warnings.warn(f"{text} no suction; give the other sign, or turn them", LoadWarning, stacklevel=2)
         by_patch[[surface.patch_index(zone) for zone in self.pressures]] = [*self.pressures.values()]
         more = _in_zone(self, surface) * by_patch[surface.patch_of_face]
         return replace(step, pressures=step.pressures + more)
@@ -221,10 +229,10 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
     cases = [FORM, *(step_name(acting_together(entry)) for entry in loads)]
     if not isinstance(given, Mapping):
         validate.refuse("combinations", given, "factors by name, such as {'uls': {'snow': 1.5}}")
-    if given and len(set(cases)) < len(cases):
+    if len(set(cases)) < len(cases):
         name = next(name for name in cases if cases.count(name) > 1)
-        text = f"combinations: two cases are called {name!r}; give each a name of its own"
-        raise OptionError(text, what="combinations", found=name)
+        text = f"loads: two cases are called {name!r}; give each a name of its own"
+        raise OptionError(text, what="loads", found=name)
     checked: dict[str, dict[str, float]] = {}
     for name, factors in given.items():
         validate.checked_name("name of a combination", name)

@@ -29,6 +29,7 @@ ROUNDING = 1e-12  # of the largest force in a member: less of another is none
 ALIKE = 1e-6  # sine of the angle of two directions that are one
 LIMIT = 300.0  # the span over this is the deflection that members are asked to keep
 STRAIGHT = 0.01  # share of a member's pull that bends it: below it needs no other line
+MOST = 0.7  # share of it: above it no cable balances even a half of its square, and none is offered
 LOOSE = 1e-3  # of the largest tension of a cable: a smaller thrust is rounding
 HELPED = 0.2  # share of a member's pull: above it the sheets carry in place of one that is too weak alone
 
@@ -296,7 +297,7 @@ def cable_offers(model: StructuralModel) -> list[str]:
     for beam in beams:
         (N, share), on = beam.balance, str(beam.line.member.on)
         alone = sum(other.line.member is beam.line.member for other in beams) == 1
-        if beam.line.wall and alone and N > 0.0 and share > STRAIGHT:
+        if beam.line.wall and alone and N > 0.0 and STRAIGHT < share < MOST:
             text = f"{on}: with these lines of its divider a cable finds the shape that does not bend:"
             lines += [text, "wall = false", f"cable = {N:.4g}"]
             lines += [f'name = "{on}"'] if re.fullmatch(r"wall \d+", on) else []

@@ -333,4 +333,5 @@ STUDY = Study(
     parameters={"sizes": {name: case.sizes for name, case in CASES.items()}, "limit": LIMIT, "rest": REST},
     seconds=500,
     paper=False,
+    timed=True,
 )

@@ -336,4 +336,5 @@ STUDY = Study(
     },
     seconds=150,
     paper=False,
+    timed=True,
 )

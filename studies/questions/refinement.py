@@ -367,4 +367,5 @@ STUDY = Study(
     parameters={f.name: {"levels": f.levels, "edge_lengths": list(f.lengths)} for f in FAMILIES},
     seconds=65,
     paper=False,
+    timed=True,
 )

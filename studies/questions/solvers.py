@@ -241,4 +241,5 @@ STUDY = Study(
     },
     seconds=60,
     paper=False,
+    timed=True,
 )

@@ -190,6 +190,32 @@ def test_blocks_layers_that_are_off_and_other_entities(tmp_path):
     assert "'divider old' (1)" in plan.notes[0]
 
 
+def test_a_name_and_tension_in_the_attribute_of_a_block(tmp_path):
+    document, space = drawn.new()
+    space.add_lwpolyline(BOX, close=True, dxfattribs=drawn.on("outline"))
+    document.blocks.new("TAG").add_attdef("NAME")
+    tag = space.add_blockref("TAG", (3, 3), dxfattribs=drawn.on("patch"))
+    tag.add_auto_attribs({"NAME": "nave = 7"})
+    document.saveas(tmp_path / "hall.dxf")
+    (label,) = read_drawing(tmp_path / "hall.dxf").labels
+    assert (label.name, label.tension) == ("nave", 7.0)
+    tag.attribs[0].is_invisible = True
+    document.saveas(tmp_path / "hall.dxf")
+    assert not read_drawing(tmp_path / "hall.dxf").labels
+
+
+def test_a_polyline_smoothed_as_a_spline_is_the_line_shown(tmp_path):
+    document, space = drawn.new()
+    line = space.add_polyline2d(BOX, close=True, dxfattribs={**drawn.on("outline"), "flags": 4})
+    for corner in line.vertices:
+        corner.dxf.flags = corner.SPLINE_FRAME_CONTROL_POINT
+    shown = [(5, 0.5), (9, 3), (5, 5.5), (1, 3)]
+    line.append_vertices(shown, {"flags": line.vertices[0].SPLINE_VERTEX_CREATED})
+    document.saveas(tmp_path / "hall.dxf")
+    outline = read_drawing(tmp_path / "hall.dxf").outline
+    assert [tuple(piece.points[0][:2]) for piece in outline.pieces] == shown
+
+
 def rhino_outline(path, curve, *corners):
     """A drawing in metres whose outline is a curve and a polyline."""
     model = rhino3dm.File3dm()

@@ -19,6 +19,7 @@ from pcmc.base.units import Units
 from pcmc.certificate.quantities import QUANTITIES, dimension_of
 from pcmc.design.targets import KINDS, MEASURES
 from pcmc.explore.page_data import unit_texts
+from pcmc.io.mesh_data import scaled_surface
 from pcmc.project import build, cached_files, clear_cache, designed, designing, load, run
 
 GOAL = """
@@ -304,3 +305,25 @@ def test_files_of_others_in_the_folder_of_the_cache_stay(folder, monkeypatch, ca
     assert cli.main(["cache", "--clear"]) == 0
     assert "1 roofs removed" in capsys.readouterr().out
     assert [path.name for path in folder.glob("*.pcmc")] == ["mine.pcmc"]
+
+
+@pytest.mark.parametrize("when", ["before", "meanwhile"])
+def test_a_roof_is_kept_for_the_mesh_that_was_read(folder, monkeypatch, when):
+    """A mesh may be exported anew while it is solved."""
+    surface = build("roof.toml")
+    pcmc.write("mesh.obj", surface)
+    Path("of_mesh.toml").write_text('[mesh]\nfile = "mesh.obj"\nrise = 0.6\n', encoding="utf-8")
+    first, solve = designed("of_mesh.toml", use_cache=False), designing.solve_project
+
+    def solved(*given):
+        done = solve(*given)
+        pcmc.write("mesh.obj", scaled_surface(surface, 1.5))
+        return done
+
+    if when == "meanwhile":
+        monkeypatch.setattr(designing, "solve_project", solved)
+    designed("of_mesh.toml")
+    again = designed("of_mesh.toml")
+    assert again.cached == (when == "before")
+    assert again.surface.size == pytest.approx((1.0 if again.cached else 1.5) * first.surface.size, rel=0.01)
+    assert [target.label for target in again.project.targets] == ["apex"]

@@ -2,6 +2,7 @@
 
 import doctest
 import re
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -213,6 +214,19 @@ def test_a_sheet_on_the_slope_between_two_zones_is_in_one(degrees):
     assert load_steps(gable, [zones])[1].pressures.tolist() == [1.0, 1.0, 3.0, 3.0]
     flat = gable.moved(np.array(X) * [1, 1, 0])
     assert load_steps(flat, [Wind({"roof": 1.0}, slopes=(0, 10))])[1].pressures.tolist() == [1.0] * 4
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_wind_on_a_roof_whose_triangles_face_down_is_told(side):
+    """Suction above 0 pushed it down, without a word."""
+    film = square(4).rebuilt(faces=square(4).faces[:, ::side])
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        wind = load_steps(film, [Wind({"film": 0.5})])[1]
+    assert wind.pressures @ area_vectors(film.vertices[film.faces])[:, 2] == pytest.approx(0.5 * side)
+    assert ["wind: the triangles of 'film' face down" in str(one.message) for one in told] == [True] * (
+        side < 0
+    )
 
 
 def test_zones_carry_snow_and_wind():

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 import pytest
 from nightly import night_but
+from rich.console import Console
 
+from pcmc.base.errors import PcmcError
 from studies import code
 from studies.__main__ import main
 from studies.code import code_at, code_of, files_of
 from studies.folder import Folder, write_json
 from studies.registry import STUDIES
+from studies.runner import Outcome
 from studies.stored import ages, between, check, differences, differing
-from studies.study import git
+from studies.study import git, perform
+from tests.studies.tiny_study import tiny_study
 
 RESULTS = Path(__file__).parents[2] / "results"
 EQUILIBRIA = STUDIES["equilibria"]
@@ -171,8 +176,12 @@ def small(tmp_path, monkeypatch):
         folder.write_table("records", records)
         folder.write_table("times", pd.DataFrame({"seconds": [1.0]}))
 
+    def run_here(studies, results, console, steps):
+        perform(study, results, steps=steps)
+        return [Outcome(study.name, 0.0)]
+
     study = replace(EQUILIBRIA, data=data, table=lambda folder: {"x": 1.0, "y": 2.0})
-    monkeypatch.setitem(STUDIES, "equilibria", study)
+    monkeypatch.setattr("studies.runner.run_all", run_here)
     monkeypatch.setattr("studies.study.provenance", lambda *_: {})
     folder = Folder(tmp_path / "equilibria")
 
@@ -232,16 +241,23 @@ def test_rounding_is_no_difference_and_more_is(stored, same):
     assert between(pd.DataFrame({"x": [0.9e-9]}), pd.DataFrame({"x": [-0.05e-9]})) == []
 
 
-def test_a_check_finds_what_the_study_reads_of_others(tmp_path, monkeypatch):
-    seen = []
-    study = replace(
-        EQUILIBRIA,
-        data=lambda folder, short: seen.append((folder.path.parent / "corners" / "grid.csv").is_file()),
-        table=lambda folder: {},
-    )
-    monkeypatch.setattr("studies.study.provenance", lambda *_: {})
-    check(study, RESULTS)
-    assert seen == [True]
+WORKER = """
+import sys
+from pathlib import Path
+study = Path(sys.argv[3]) / sys.argv[1]
+if not (study.parent / "corners" / "grid.csv").is_file(): sys.exit("no corners")
+study.mkdir()
+(study / "measured.csv").write_text("key,value")
+"""
+
+
+def test_a_check_finds_what_the_study_reads_of_others(tmp_path):
+    script = tmp_path / "worker.py"
+    script.write_text(WORKER)
+    quiet, worker = Console(quiet=True), (sys.executable, str(script))
+    assert check(tiny_study(), RESULTS, quiet, worker=worker) == ["tiny/measured.csv: only now"]
+    with pytest.raises(PcmcError, match="tiny: no corners"):
+        check(tiny_study(), tmp_path, quiet, worker=worker)
 
 
 def test_continuous_integration_computes_a_stored_result_again():
@@ -259,4 +275,4 @@ def test_every_stored_result_knows_its_commit_and_its_code():
 
 @pytest.mark.nightly
 def test_equilibria_are_as_stored():
-    assert check(EQUILIBRIA, RESULTS) == []
+    assert check(EQUILIBRIA, RESULTS, Console(quiet=True)) == []

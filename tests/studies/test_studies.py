@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,7 @@ from studies.__main__ import main
 from studies.folder import Folder, mesh_hash
 from studies.paper import read_measured
 from studies.registry import STUDIES, chosen
-from studies.runner import run_all
+from studies.runner import environment, run_all
 from studies.study import perform
 from studies.worker import main as work
 from tests.studies.tiny_study import tiny_study
@@ -165,6 +166,16 @@ def test_a_failing_or_crashing_study_is_an_outcome_and_the_others_go_on(tmp_path
     assert outcomes[0].error == "the mesh is gone"
     assert "code" in outcomes[2].error or "abort" in outcomes[2].error.lower()
     assert outcomes[1].error == outcomes[3].error == ""
+
+
+def test_a_process_rounds_as_on_every_processor_unless_its_times_count():
+    script = "import numpy as np; print(np.show_config(mode='dicts')['SIMD Extensions'].get('found'))"
+    tiny = tiny_study()
+    with_common = subprocess.run([sys.executable, "-c", script], env=environment(tiny), capture_output=True)
+    assert with_common.stdout.strip() in (b"None", b"[]"), with_common.stderr
+    timed = environment(replace(tiny, timed=True))
+    assert timed["OMP_NUM_THREADS"] == "1"
+    assert "MKL_CBWR" not in timed or "MKL_CBWR" in os.environ
 
 
 def test_interrupt_ends_the_processes_under_way(tmp_path):
