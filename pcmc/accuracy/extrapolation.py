@@ -68,7 +68,8 @@ def extrapolate(
         corners, ends of junctions, contact or uneven triangles let it have. A quantity may owe a better one
         to errors that cancel. With S = 2^s the last difference would leave d_2 / (S - 1). Up to 1.5 the
         bar is also at least what |d_1| / (S (S - 1)), the rest where d_1 shrinks by S with each mesh, and
-        |limit - q_2| differ by. If s ≤ 0, no limit is in sight. It counts where s < 2.
+        |limit - q_2| differ by; where the signs differ, d_2 may be small by chance, and the bar is at least
+        2 |d_1| / (S - 1). If s ≤ 0, no limit is in sight. It counts where s < 2.
     doubt : (q,) how far limits may be off as the curves of the boundary are not known; added to the bars.
 
     Examples
@@ -94,8 +95,9 @@ def extrapolate(
     if shape_order <= 0.0:
         bar = np.full_like(none, np.inf)
     elif shape_order <= UNSETTLED and len(steps) > 1:
+        swing = SAFETY * np.abs(steps[-2]) / (2.0**shape_order - 1.0) * (steps[-2] * steps[-1] < 0.0)
         left = np.abs(steps[-2]) / (2.0**shape_order * (2.0**shape_order - 1.0))
-        bar = np.maximum(bar, np.abs(left - np.abs(limit - q[-1])))
+        bar = np.maximum(bar, np.maximum(swing, np.abs(left - np.abs(limit - q[-1]))))
     limit, bar = np.where(equal, q[-1], limit), np.where(equal, rounding, bar) + doubt
     limit, bar = np.where(np.isinf(bar), np.nan, limit), np.where(np.isnan(limit), np.inf, bar)
     error = np.where(np.isnan(limit), np.inf, np.abs(limit - value) + bar)

@@ -45,8 +45,9 @@ from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
-from .extrapolation import extrapolate
+from .extrapolation import USUAL, extrapolate
 from .mesh_check import check_mesh, with_bar
+from .persistence import shape_order
 from .varied import Varied
 
 FIRST, LARGEST = 0.05, 0.15  # the first and the longest step along the branch, as of ``follow``
@@ -154,8 +155,7 @@ def _follow(
 
 
 def _compression(branch: Branch) -> float | None:
-    """λ at which α + w z̄ of a triangle or τ + g z̄ of a cable reaches 0, linear between the last two points;
-    None if none does."""
+    """λ at which an α + w z̄ or τ + g z̄ reaches 0, linear between the last two points; None if none does."""
     parameters, surfaces = branch.points.parameter.tolist()[-2:], [*branch.surfaces.values()][-2:]
     if len(parameters) < 2:
         return None
@@ -176,7 +176,7 @@ OPEN = (MarginEnd.NONE, MarginEnd.MESH)  # ends that leave the margin open above
 class Margin:
     """How far a surface at rest is from the edge. ``print`` shows a sentence.
 
-    A bar is an estimate from two meshes; infinite from one, and where the meshes end differently.
+    A bar is an estimate, infinite from one mesh, where meshes end differently, or show no limit.
     """
 
     what: str  # what is varied, such as "pressure" or "tension of west"
@@ -231,7 +231,7 @@ def margin(
     *,
     towards: str | None = None,
     most: float = MOST,
-    meshes: int = 2,
+    meshes: int = 3,
     corners: npt.ArrayLike = (),
     callback: Callback | None = None,
     certificate: Certificate | None = None,
@@ -251,10 +251,10 @@ def margin(
     towards : ``"more"`` or ``"less"``; by default loads and walls pull more, sheets and cables less.
     most : followed up to this factor, or down to 1 over it; of what is 0 now, up to so many times the
         largest pressure, or tension over size.
-    meshes : on so many meshes in all, each once refined from the one before, for the bar.
+    meshes : for the bar, in all, each once refined from the one before; 2 take order 2, and may not have it.
     corners : as of ``pcmc.check_mesh``.
     callback : called with a ``Progress`` at each step; StopIteration in it ends with KeyboardInterrupt.
-    certificate : of the surface, if it is known.
+    certificate : of the surface, if known.
 
     Raises
     ------
@@ -291,30 +291,30 @@ def margin(
         raise SurfaceError(message, what="surface", found=certificate.residual)
     find = partial(find_end, varied=varied, index=index, most=most, callback=callback)
     end, unit, notes = find(surface), varied.unit or 1.0, list[str]()
-    ends = [end]
+    ends, order = [end], USUAL
     if end.ends_by is MarginEnd.MESH:
         notes = [only_coarse(end.surface, standing_part(end.surface).walls.pinchable)]
     if meshes > 1 and end.ends_by is not MarginEnd.NONE:
         try:
             check = check_mesh(surface, meshes, corners=corners, callback=callback)
+            order = shape_order(check.surfaces)
             ends += map(find, check.surfaces[1:] if check.persists else ())
             doubt = "" if check.persists else f"the mesh check finds that the roof {check.verdict.value}"
         except PcmcError as error:
             ends, doubt = ends[:1], str(error)
-        words = [(one, one.ends_by.value.partition(":")[0]) for one in ends[1:]]
-        shown = [f"on {one.surface.m} triangles {unit * one.factor:.4g} ({why})" for one, why in words]
-        notes.append(f"no bar: {doubt}" if doubt else ", ".join(shown))
+        values = [(one.surface.m, unit * one.factor, one.ends_by.value.partition(":")[0]) for one in ends[1:]]
+        shown = ", ".join(f"on {m} triangles {value:.4g} ({why})" for m, value, why in values)
+        notes.append(f"no bar: {doubt}" if doubt else shown)
     numbers = np.array([[unit * one.factor] for one in ends])
     alike = {one.ends_by in OPEN for one in ends} == {False}
-    bars = extrapolate(numbers if alike else numbers[:1], np.array([EVENT_ACCURACY * abs(numbers[0, 0])]))
-    mode = _mode(end, index)
+    bars = extrapolate(numbers if alike else numbers[:1], EVENT_ACCURACY * abs(numbers[0]), shape_order=order)
+    mode, dimensions = _mode(end, index), {dimension_of(kind) for kind, _ in varied.parts}
     if end.contacts:
         at = ", ".join(f"{unit * factor:.4g}" for factor in end.contacts)
         notes.append(f"ridges come to rest, or lift off, on the way: at {at}")
     notes.append(pressures_left_over(end.surface))
     if certificate.symmetric_in:
         notes.append(f"among shapes symmetric in {', '.join(certificate.symmetric_in)}")
-    kinds = {dimension_of(kind) for kind, _ in varied.parts}
     return Margin(
         what=varied.what,
         more=varied.more,
@@ -329,7 +329,7 @@ def margin(
         mode=mode,
         where=_where(end, mode),
         index=index,
-        dimension=kinds.pop() if len(kinds) == 1 else "",
+        dimension=dimensions.pop() if len(dimensions) == 1 else "",
     )
 
 

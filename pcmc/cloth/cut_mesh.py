@@ -84,6 +84,12 @@ class CutMesh:
         vertex[label] = self.F.ravel()
         return Pieces(label.reshape(-1, 3), vertex, components(sides // 3, len(self.F)))
 
+    @property
+    def middles(self) -> Floats:
+        """(k,3) the middle of the corners of each piece."""
+        frame = pd.DataFrame(self.X[self.F].mean(axis=1)).groupby(self.pieces.piece).mean()
+        return frame.to_numpy()
+
     def with_points(self, ends: Ints, points: Floats) -> CutMesh:
         """The mesh with vertices at points (k,3) on different edges (k,2)."""
         number = len(self.X) + np.arange(len(ends))
@@ -178,9 +184,10 @@ class CutMesh:
         gap = np.minimum(share, 1.0 - share)
         met = np.unique(nearest[gap <= SNAP])  # both ends are among these
         crossed = gap > np.where(np.isin(nearest, met), BESIDE, SNAP)
-        passed, first = np.unique(nearest[~crossed], return_index=True)
-        loose = ~np.isin(passed, fixed)
-        X[passed[loose]] = path[~crossed][first[loose]]
+        for vertex in np.setdiff1d(nearest[~crossed], fixed).tolist():
+            parts = np.stack([path[:-1], path[1:], path[1:]], axis=1)
+            weights, away = nearest_places(parts, X[vertex])
+            X[vertex] = weights[away.argmin()] @ parts[away.argmin()]
         new = pd.factorize(place[crossed] @ np.array([len(X), 1]))[0]  # edges by number, as they come
         first = np.unique(new, return_index=True)[1]
         nodes = nearest.copy()
@@ -284,7 +291,7 @@ def sheet_axes(P: Floats, plane: Plane, degrees: float | None) -> tuple[Floats, 
         turned = np.cos(ANGLES)[:, None] * second - np.sin(ANGLES)[:, None] * first
         widths = np.ptp(P.reshape(-1, 3) @ turned.T, axis=0)
         widths[:2] *= NARROWER ** np.array([2, 1])
-        across = turned[widths.argmin()]
+        across = turned[(widths / widths.max()).round(6).argmin()]  # of equal ones the first
     else:
         across = np.cross(normal, np.cos(np.radians(degrees)) * east + np.sin(np.radians(degrees)) * north)
         if np.linalg.norm(across) < 1e-6:

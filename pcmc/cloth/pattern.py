@@ -107,11 +107,14 @@ def cutting_pattern_of(
 
 
 def _sheets(surface: Surface, base: CutMesh, options: CuttingOptions) -> list[ClothSheet]:
-    """The sheets without drawn seams, at even levels."""
+    """The sheets without drawn seams, at even levels; in the order of patches and places, as seams of the
+    later ones meet those of the earlier."""
     piece, topo, net = base.pieces.piece, base.topology, options.net_width
     drawn = mask_of(topo.edge_numbers(base.cuts[base.seam >= 0]), len(topo.edges))
-    sheets: list[ClothSheet] = []
-    for k in np.setdiff1d(piece, piece[drawn[topo.edge_of_face].any(axis=1)]).tolist():
+    patch = surface.patch_of_face[base.source[np.unique(piece, return_index=True)[1]]]
+    x, y, _ = (base.middles / base.size).round(6).T
+    order, sheets = np.lexsort((y, x, patch)), list[ClothSheet]()
+    for k in order[~np.isin(order, piece[drawn[topo.edge_of_face].any(axis=1)])].tolist():
         source, P = base.source[piece == k], base.X[base.F[piece == k]]
         name = surface.patches[surface.patch_of_face[source[0]]].name
         if (count := options.of_patch("strips", name)) is None and net is None:

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy.sparse import csr_array, vstack
 from scipy.sparse.linalg import splu
+from scipy.spatial import ConvexHull
 
 from ..base.arrays import Bools, Floats, Ints, block_rows, cached_array, mask_of
 from ..base.tolerances import ON
@@ -27,6 +28,7 @@ KINDS = ("seam", "junction", "mirror", "rim")  # in the order of their numbers
 SEAM_WEIGHT = 1e3  # of a seam's misfit beside the strain: squared, so that seams are equal to about 1e-9
 ROUNDS, SMALL_STEP = 50, 1e-10  # of the descent; a last step, in the size, and a strain that is none
 FOLDED = 1e6  # the strain of a triangle laid on its back
+NARROWER, ASKEW = 0.02, 0.1  # of a strip's width, for a warp square to x; sine of the angle to x that is best
 SHORTEST = 1e-4  # part of a step that is still tried
 
 
@@ -56,13 +58,13 @@ class Cloth:
         """Strips in the order of their patches, then of their places across the sheet."""
         piece = mesh.pieces.piece
         source = mesh.source[np.unique(piece, return_index=True)[1]]  # a face of each piece
-        centre = mesh.X[mesh.F].mean(axis=1)
-        middle = np.stack([np.bincount(piece, c) / np.bincount(piece) for c in centre.T], axis=1)
-        sheet, place = np.full(len(source), -1), middle[:, 0].copy()
+        middle, sheet = mesh.middles, np.full(len(source), -1)
+        place = middle[:, 0].copy()
         for s, one in enumerate(sheets):
             mine = one.source[source]
             sheet[mine], place[mine] = s, middle[mine] @ one.across
-        order = np.lexsort((place.round(9), sheet, surface.patch_of_face[source]))
+        x, y = ((values / mesh.size).round(6) for values in (place, middle[:, 1]))
+        order = np.lexsort((y, x, sheet, surface.patch_of_face[source]))
         along: list[Floats | None] = [sheets[s].along if s >= 0 else None for s in sheet[order].tolist()]
         for k in np.flatnonzero(sheet[order] < 0).tolist():  # beside drawn seams
             name = surface.patches[surface.patch_of_face[source[order[k]]]].name
@@ -136,19 +138,22 @@ class Cloth:
         """(u,2) each strip alone, with its warp along x."""
         F, alone = self.mesh.pieces.faces, np.empty((2, 0, 2), dtype=np.int64)
         flat = flattened(self.X, F, self.strip_of_vertex, alone, np.ones((len(self.X), 2)))[0]
-        points, angles = flat.copy(), np.radians(np.arange(0.0, 180.0, 0.5))
+        points = flat.copy()
         for k, along in enumerate(self.along):
             mine, faces = self.strip_of_vertex == k, F[self.strip_of_face == k]
-            c, s = np.cos(angles), np.sin(angles)
-            if along is None:  # the direction across which it is narrowest
-                narrow = np.ptp(flat[mine] @ np.stack([-s, c]), axis=0).argmin()
-                c, s = c[narrow], s[narrow]
-            else:
-                edges, flat_edges = (at[faces][:, 1:] - at[faces][:, :1] for at in (self.X, flat))
-                # along = share · edges, and a part normal to the triangle
-                share = np.linalg.solve(edges @ edges.transpose(0, 2, 1), (edges @ along)[:, :, None])
-                warp = face_areas(self.X[faces]) @ (share * flat_edges).sum(axis=1)
-                c, s = warp / (np.linalg.norm(warp) or 1.0)
+            edges, flat_edges = (at[faces][:, 1:] - at[faces][:, :1] for at in (self.X, flat))
+            # along = share · edges, and a part normal to the triangle; by default x of the plan
+            direction = self.surface.plane.axes[0] if along is None else along
+            share = np.linalg.solve(edges @ edges.transpose(0, 2, 1), (edges @ direction)[:, :, None])
+            warp = face_areas(self.X[faces]) @ (share * flat_edges).sum(axis=1)
+            c, s = warp / (np.linalg.norm(warp) or 1.0)
+            if along is None:  # the side of its hull across which it is narrowest
+                hull = flat[mine][ConvexHull(flat[mine]).vertices]
+                sides = unit_vectors(np.roll(hull, -1, axis=0) - hull)
+                widths = np.ptp(hull @ np.stack([-sides[:, 1], sides[:, 0]]), axis=0)
+                # of about equal ones that nearest to x, of those at 45 degrees the one before 90
+                off_x = sides @ (np.array([-s, c]) - ASKEW * np.array([c, s]))
+                c, s = sides[(widths * (1.0 + NARROWER * off_x**2)).argmin()]
             points[mine] = flat[mine] @ np.array([[c, -s], [s, c]])
         return points
 
@@ -261,9 +266,11 @@ def _pins(X: Floats, strip: Ints) -> tuple[Ints, Floats]:
     """(4 k,) for each strip the places in a vector 2 u of x, y, x, y of two far points; their values."""
     pins, places = list[int](), list[float]()
     for mine in (np.flatnonzero(strip == k) for k in np.unique(strip)):
-        first = mine[np.linalg.norm(X[mine] - X[mine].mean(axis=0), axis=1).argmax()]
+        away = np.linalg.norm(X[mine] - X[mine].mean(axis=0), axis=1)
+        first = mine[(away / away.max()).round(6).argmax()]  # of equal ones not that of rounding
         away = np.linalg.norm(X[mine] - X[first], axis=1)
-        pins += [2 * end + axis for end in sorted((first, mine[away.argmax()])) for axis in (0, 1)]
+        second = mine[(away / away.max()).round(6).argmax()]
+        pins += [2 * end + axis for end in sorted((first, second)) for axis in (0, 1)]
         places += [0.0, 0.0, away.max(), 0.0]
     return np.array(pins), np.array(places)
 

@@ -217,7 +217,7 @@ class StandingPart:
 def _put_down(surface: Surface, walls: Walls, X: Floats, down: Bools) -> Floats:
     """X (n,3) with the vertices ``down`` on Π, or on their vertices of a held bottom."""
     X, held = X.copy(), down & walls.held
-    X[down] -= surface.plane.height(X[down])[:, None] * np.array(surface.plane.normal)
+    X[down] -= surface.plane.height(X[down])[:, None] * walls.rising(surface)[down]
     X[held] = X[walls.foot[held]]
     return X
 
@@ -255,9 +255,9 @@ def lift(
 ) -> Surface:
     """The whole surface with resting ``vertices`` raised by a fraction of their spacing, and their wall rows.
 
-    ``ways`` are unit directions (n,3), by default off Π.
+    ``ways`` are directions (n,3), by default off Π.
     """
-    ways = walls.side[:, None] * np.array(surface.plane.normal) if ways is None else ways
+    ways = walls.side[:, None] * walls.rising(surface) if ways is None else ways
     spacing = top_spacing(surface, walls)
     rise = fraction * np.where(vertices & np.isfinite(spacing), spacing, 0.0)
     X = surface.vertices + rise[:, None] * ways
@@ -318,7 +318,7 @@ def pull_and_capacity(part: StandingPart, force: Floats | None = None) -> tuple[
     pull = np.where(part.resting, np.einsum("ij,ij->i", _lifting_forces(part, force), d), 0.0)
     vertex, half, along = _edge_ends(part.surface, part.walls)
     across = np.linalg.norm(np.cross(d[vertex], along), axis=1)
-    half = half * np.where(part.walls.meeting[vertex], across, 1.0)
+    half = half * np.where((part.walls.meeting & part.walls.held)[vertex], across, 1.0)
     return pull, np.where(part.resting, np.bincount(vertex, half, part.whole.n), 0.0)
 
 
@@ -381,14 +381,14 @@ def excess_pull(part: StandingPart, force: Floats) -> Floats:
 
 
 def pull_directions(part: StandingPart, force: Floats) -> Floats:
-    """(n,3) the unit direction to lift each vertex: off Π, or as a held one is pulled.
+    """(n,3) the direction to lift each vertex: off Π by 1, or the unit one in which a held one is pulled.
 
     Where held walls meet, they resist a motion d by h(d) = Σ c |d × e|, c = ½ α_w ℓ, most where it is across
     all of them. The direction is the one of the largest ⟨f, d⟩ / h(d): there f ∝ M d, M = Σ c (1 - e eᵀ) /
     |d × e|, a fixed point (Weiszfeld's). An upright plane takes what is across it.
     """
     surface, walls, resting = part.surface, part.walls, part.resting
-    direction = walls.side[:, None] * np.array(surface.plane.normal)
+    direction = walls.side[:, None] * walls.rising(surface)
     held = resting & walls.held
     if not held.any():
         return direction

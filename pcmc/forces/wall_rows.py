@@ -257,6 +257,13 @@ class Walls:
         held[self.wall_below[(self.foot[self.top_edges] >= 0).all(axis=1)]] = True
         return self.pinchable & ~held
 
+    def rising(self, surface: Surface) -> Floats:
+        """(n,3) the way up from Π, by 1, that the supports of each vertex leave it: along a leaning plane."""
+        normal = np.array(surface.plane.normal)
+        way = self.admissible.part(np.tile(normal, (len(self.foot), 1)))
+        rise = (way @ normal)[:, None]
+        return np.divide(way, rise, out=way, where=rise > 0.0)
+
     @cached_property
     def _over_bottom(self) -> tuple[Ints, Ints]:
         """The vertices (k,) between two top edges over a held bottom, and the other ends (k,2) of these."""

@@ -130,7 +130,9 @@ class HarmonicExtension:
     ) -> None:
         used = ~classes.idle
         space = _one_unknown_each(used)
-        equal = surface._with(cables=()).retensioned({p.name: 1.0 for p in surface.patches})
+        names = [patch.name for patch in surface.patches]
+        ones, none = dict.fromkeys(names, 1.0), dict.fromkeys(names, 0.0)
+        equal = surface._with(cables=()).retensioned(ones, weights=none)
         pattern = hessian_pattern(classes, space)
         L = pattern.symmetric(_laplacian(equal, classes, space, pattern, X))
         curves = (classes.kind != SHEET) | surface.fixed

@@ -229,10 +229,10 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
     cases = [FORM, *(step_name(acting_together(entry)) for entry in loads)]
     if not isinstance(given, Mapping):
         validate.refuse("combinations", given, "factors by name, such as {'uls': {'snow': 1.5}}")
-    if given and len(set(cases)) < len(cases):
+    if len(set(cases)) < len(cases):
         name = next(name for name in cases if cases.count(name) > 1)
-        text = f"combinations: two cases are called {name!r}; give each a name of its own"
-        raise OptionError(text, what="combinations", found=name)
+        text = f"loads: two cases are called {name!r}; give each a name of its own"
+        raise OptionError(text, what="loads", found=name)
     checked: dict[str, dict[str, float]] = {}
     for name, factors in given.items():
         validate.checked_name("name of a combination", name)

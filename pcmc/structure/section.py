@@ -375,11 +375,18 @@ def members_of(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> tup
 def check_members(given: Mapping[str, Mapping[str, Any]], plan: Plan | None) -> None:
     """Refuse keys of [structure.members] that count for nothing where the plan has the members."""
     curves = {member.name for member in members_of(given, plan) if isinstance(member.on, Curve)}
+    lines = curves | {divider.member for divider in (plan.dividers if plan else ())}
+    lines |= {name for name, table in given.items() if table.get("on")}
     for name, table in given.items():
         for key, counts, of in (
             ("propped", name in curves, "a member along edges or around a hole"),
             ("strength", table.get("bars"), "columns and stays, bars ="),
-            ("ends", table.get("kind") != "cable", "a beam"),
+            (
+                "ends",
+                table.get("kind") != "cable" and name in lines,
+                "a beam along edges, as columns have hinges",
+            ),
+            ("density", name in lines, "a member along edges, as no weight of columns counts"),
         ):
             if table.get(key, getattr(MemberSection, key)) != getattr(MemberSection, key) and not counts:
                 text = f"member {name!r}: {key} is of {of}; leave it out"

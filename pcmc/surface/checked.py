@@ -48,7 +48,7 @@ def checked_parts(given: Mapping[str, Any]) -> dict[str, Any]:
     # a vertex that slides on another plane alone may come down to Π like a free one
     bound = fixed | supports.on_plane | supports.guided
     checks.mesh(X, F, patch, topo, patches, bound, plane.height(X))
-    check_on([(plane, resolved["on_plane"]), *planes], X, size)
+    check_on([(plane, supports.fixed_and_sliding()[1]), *planes], X, size)
     order = checked_order(given["order"], F, patch)
     curves = checked_curves(given["curves"], X, topo, fixed & ~supports.guided, size)
     parts = {"cables": cables, "on_planes": planes, "on_line": lines, "curves": curves, "order": order > 1}

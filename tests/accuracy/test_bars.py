@@ -122,6 +122,7 @@ def test_an_accuracy_is_not_reached_beyond_what_is_known_of_the_curves():
         ((0.13, 0.0328, 0.00791), 1.99),  # the energy of a double bubble of unequal tensions
         ((-0.0090, -0.00226, -0.000538), 1.87),  # the height of a cap in a wedge
         ((-2.566e-2, -4.26e-3, -1.66e-3), 2.0),  # an order of 3 that is none
+        ((0.1091, 0.0541, 0.0873), 1.0),  # the thrust beside a wall that begins to rest: it swings
     ],
 )
 def test_orders_that_the_surface_does_not_have_are_not_believed(errors, shape_order):

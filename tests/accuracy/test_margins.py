@@ -38,6 +38,29 @@ def test_a_cap_folds_as_a_hemisphere(what, exact):
     assert np.ptp(found.surface.vertices[:, 2]) == pytest.approx(1.0, abs=0.1)
 
 
+def test_a_coarse_end_that_does_not_settle_yet_has_no_bar(monkeypatch):
+    """A liquid bridge's least volume on 80, 320 and 1280 triangles, exactly 0.3869.
+
+    From the first two it was 0.3774 ± 0.0011, as they happen to be nearly the same.
+    """
+    seen = iter((0.3774, 0.3778, 0.3826))
+
+    def find_end(surface, *_, **__):
+        return End(MarginEnd.FOLD, next(seen), surface, np.zeros((surface.n, 3)))
+
+    monkeypatch.setattr("pcmc.accuracy.margins.find_end", find_end)
+    found = margin(cap(edge_length=0.6), "pressure")
+    assert found.bar == np.inf
+    assert "± unknown" in found.text()
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("edge_length", [0.6, 0.45, 0.4])
+def test_the_least_volume_of_a_coarse_bridge_is_within_its_bar(edge_length):
+    found = margin(bridge(edge_length), "volume", towards="less")
+    assert abs(found.factor - 2.431193 / (2.0 * np.pi)) <= found.bar
+
+
 def test_snow_that_is_not_there_is_added():
     """Net p - s from 1 down to -2 α."""
     found = margin(cap(), "snow")
@@ -103,12 +126,16 @@ def test_pressure_in_a_film_between_rings():
     assert found.where == "the roof inflates"
 
 
+def bridge(edge_length):
+    """A cylinder of liquid between unit rings 2 apart."""
+    tube = cylinder(edge_length, exact=True)
+    supported = {"fixed": tube.fixed, "rooms": [Room("liquid", {"tube": 1}, 2.0 * np.pi)]}
+    return solve(Surface(tube.vertices, tube.faces, tube.patch_of_face, tube.patches, **supported)).surface
+
+
 def test_a_liquid_bridge_that_loses_volume_folds_with_its_neck_going_in():
     """Between unit rings 2 apart the least volume of Delaunay's surfaces is 2.431193, by their equation."""
-    tube = cylinder(0.3, exact=True)
-    supported = {"fixed": tube.fixed, "rooms": [Room("liquid", {"tube": 1}, 2.0 * np.pi)]}
-    bridge = solve(Surface(tube.vertices, tube.faces, tube.patch_of_face, tube.patches, **supported)).surface
-    found = margin(bridge, "volume", towards="less", meshes=1)
+    found = margin(bridge(0.3), "volume", towards="less", meshes=1)
     assert found.ends_by is MarginEnd.FOLD
     assert found.value == pytest.approx(2.431193, rel=0.03)
     assert found.where.startswith("'tube' moves in, most near")

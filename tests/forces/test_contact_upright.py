@@ -1,11 +1,14 @@
 """Walls in an upright plane: strong ones come down on their bottom, and the plane takes the pull across."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from pcmc import Verdict, solve
+from generators.grid import grid_faces
+from pcmc import Patch, Plane, Surface, Verdict, energy, solve
 from pcmc.forces.functional import energy_and_gradient
-from pcmc.forces.pinching import pull_and_capacity, pull_directions, standing_part
+from pcmc.forces.pinching import lift, pull_and_capacity, pull_directions, standing_part
 from pcmc.forces.wall_rows import find_walls
 from pcmc.plan import Divider, Plan
 
@@ -60,3 +63,35 @@ def test_upright_walls_that_meet_come_down_together(upright):
     walls = find_walls(found.surface)
     assert standing_part(found.surface).resting[walls.held].all()
     assert walls.meeting.sum() == 1
+
+
+def leaning(lean, wall):
+    """Two sheets on three fixed sides; the fourth and the end of their wall slide on a plane that leans."""
+    x, y = (part.ravel() for part in np.meshgrid(np.linspace(-2, 2, 5), np.linspace(0, 2, 3), indexing="ij"))
+    z = 0.1 * (4 - x**2) * (2 - y)
+    X = np.column_stack([x, np.where(y == 0, -lean * z, y), z])
+    X = np.concatenate([X, [[0, 0, 0], [0, 1, 0]]])
+    faces = [*grid_faces(4, 2).tolist(), [6, 7, 16], [6, 16, 15], [7, 8, 16]]
+    patches = [Patch("west", 2.0), Patch("east", 2.0), Patch("wall", wall, 0.0)]
+    fixed, side = np.append((np.abs(x) == 2) | (y == 2), [False, False]), np.append(y == 0, [True, False])
+    planes = {Plane((0, 0, 0), (0, 1, lean)): side}
+    return Surface(X, faces, [0] * 8 + [1] * 8 + [2] * 3, patches, fixed, [15, 16], on_planes=planes)
+
+
+@pytest.mark.parametrize(
+    ("lean", "wall", "at_rest"), [(0.3, 1.0, [6]), (0.3, 2.0, [6, 7]), (-0.3, 4.0, [6, 7])]
+)
+def test_in_a_leaning_plane_a_junction_comes_down_along_it(lean, wall, at_rest):
+    """The pull and what the wall takes are those of a short lift along the plane."""
+    found = solve(leaning(lean, wall), target="stationary")
+    assert found.converged
+    part = standing_part(found.surface)
+    assert np.flatnonzero(part.resting).tolist() == at_rest
+    pull, capacity = pull_and_capacity(part)
+    for side in (1.0, -1.0):
+        walls = replace(part.walls, side=side * part.walls.side)
+        for v in at_rest:
+            lifted = lift(found.surface, walls, np.arange(found.surface.n) == v, 1e-6)
+            rise = abs(lifted.vertices[v, 2])
+            slope = (energy(lifted) - found.energy) / rise
+            assert slope == pytest.approx(capacity[v] - side * pull[v], rel=1e-4)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from backends import every_backend
+from cable_cases import net
 from shapes import disc
 
 from pcmc import Patch, Surface
@@ -25,3 +26,13 @@ def test_sheets_are_carried_along_rigidly_however_thin_a_triangle_beside_the_bou
         motion_space(film, classes, X), np.where(rim[:, None], shift, 0.0)
     )
     np.testing.assert_allclose(carried, np.broadcast_to(shift, X.shape), atol=1e-5)
+
+
+def test_sheets_are_carried_along_alike_whatever_they_weigh():
+    """Their weights are left out as their tensions are: with them the way depended on the units."""
+    heavy = net()
+    light = heavy.retensioned(weights={"a": 0.0, "b": 0.0})
+    motion = np.random.default_rng(0).standard_normal((heavy.n, 3))
+    classes = vertex_classes(heavy)
+    carried = [HarmonicExtension(s, classes, s.vertices).harmonic(motion) for s in (heavy, light)]
+    np.testing.assert_array_equal(*carried)

@@ -15,7 +15,7 @@ from pcmc.structure import Gas
     [
         ({"loads": [Snow(1.0)], "combinations": {"uls": {"snw": 1.5}}}, "combinations"),
         ({"loads": [Snow(1.0)], "combinations": {"snow": {"snow": 1.5}}}, "combinations"),
-        ({"loads": [Snow(1.0), Snow(2.0)], "combinations": {"uls": {"snow": 1.5}}}, "combinations"),
+        ({"loads": [Snow(1.0), Snow(2.0)]}, "loads"),
         ({"combinations": {"uls": {}}}, "combinations"),
         ({"combinations": {"uls": {"form": float("nan")}}}, "factor"),
         ({"combinations": [1.0]}, "combinations"),

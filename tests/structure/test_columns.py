@@ -20,7 +20,7 @@ from pcmc.report.tables import Table
 from pcmc.structure import Member, Profile, analyse
 from pcmc.structure.columns import column_answers, column_table, column_text, columns_at_rest
 from pcmc.structure.member_forces import members_at_rest
-from pcmc.structure.section import members_of
+from pcmc.structure.section import check_members, members_of
 
 TUBE, STEEL = Profile.tube(0.1143, 0.005), Material(2.1e8, density=7.85)
 ROPE, NONE = Profile(3e-4, 1e-9), Units()
@@ -229,3 +229,14 @@ def test_columns_of_a_project_stand_at_points_of_the_plan():
         members_of({"mast": {"young": 2.1e8, "bars": table["bars"]}}, plan)
     with refused(OptionError, what="Member.on"):
         members_of({"mast": table | {"bars": [[0, 0]]}}, plan)
+
+
+@pytest.mark.parametrize(("key", "value"), [("density", 7.85), ("ends", "clamped")])
+def test_keys_that_count_for_nothing_on_a_column_are_refused(key, value):
+    """Its weight is left out, and it has hinges: both were taken without a word."""
+    mast = {"young": 2.1e8, "diameter": 0.1, "bars": [[[0, 0], [0, 0]]], key: value}
+    arch = {**mast, "bars": []}
+    plan = Plan([[0, 0], [9, 0], [9, 9]], [{"curve": [[3, 0], [3, 3]], "member": "arch"}], tension=1.0)
+    with refused(OptionError, what=key, where="mast"):
+        check_members({"arch": arch, "mast": mast}, plan)
+    check_members({"arch": arch}, plan)

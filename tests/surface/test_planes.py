@@ -296,6 +296,10 @@ def test_what_it_refuses():
     X, F, patches = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], [Patch("a", 1.0)]
     with refused(SurfaceError, what="vertices", where=1):
         Surface(X, F, [0], patches, on_planes={Plane(normal=(1, 0, 0)): [1]})
+    with refused(SurfaceError, what="vertices", where=0):  # on the one of two planes alone
+        Surface(
+            X, F, [0], patches, on_plane=[0], plane=Plane((0, 0, 1)), on_planes={Plane(normal=(0, 1, 0)): [0]}
+        )
     three = {Plane((place, 0, 0), (1, 1, 0)): [0] for place in (0, 1)} | {Plane(normal=(0, 1, 0)): [0]}
     with refused(SurfaceError, what="on_planes", where=0) as caught:
         Surface(X, F, [0], patches, on_planes=three)
