@@ -103,6 +103,8 @@ def check_varied(path: PathLike, values: Mapping[str, Sequence[Any]]) -> None:
                 source.loaded(start.surface, {name: value})
             else:
                 source.project({name: value})
+    if start is not None:  # refuses two names of one number
+        source.loaded(start.surface, {name: given[0] for name, given in values.items()})
 
 
 class _Source(NamedTuple):
@@ -158,6 +160,14 @@ class _Source(NamedTuple):
                 names = tuple(dict.fromkeys([*known, *keys, *near]))
                 raise OptionError(f"{self.path}: {unknown('number', name, names)}", what=name, expected=names)
             kind, part = known[name]
+            parts, field, _ = KINDS[kind]
+            same = [f"{table}.{parts}.{part}.{field}" for table in ("plan", "mesh")]
+            if kind == "tensions":
+                same += [f"plan.dividers.{line}.wall" for line in (part, part.removeprefix("wall "))]
+            same += [other for other in values if other != name and known.get(other) == known[name]]
+            if twice := [other for other in same if other in values]:
+                text = f"{self.path}: {name} and {twice[0]} are one number; give one of them"
+                raise OptionError(text, what=name, found=twice[0])
             given[kind][part] = values[name]
         with in_file(self.path, OptionError):
             return with_loads(surface, given)

@@ -266,6 +266,15 @@ def test_bad_names_and_values_are_refused_before_any_case(roof, name, value, mes
         project_sweep(roof, good | {name: [value, 1.0]})
 
 
+def test_two_names_of_one_number_are_refused(roof):
+    """The second one was in the table, and counted for nothing."""
+    names = {"west.tension": "plan.patches.west.tension", "wall 1.tension": "plan.dividers.1.wall"}
+    for name, other in names.items():
+        with pytest.raises(PcmcError, match=f"{name} and {other} are one number; give one of them"):
+            project_sweep(roof, {name: [4.0], other: [5.0, 6.0]})
+    assert len(project_sweep(roof, {"west.tension": [4.0], "plan.patches.east.tension": [5.0]})) == 1
+
+
 def test_a_name_that_is_none_is_refused_by_a_case_too(roof):
     with pytest.raises(OptionError, match=r"unknown number 'edge'"):
         varied(roof, {"edge": 1.0})
