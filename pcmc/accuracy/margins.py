@@ -46,7 +46,7 @@ from ..surface.geometry import vertex_area_vectors
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
 from .extrapolation import USUAL, extrapolate
-from .mesh_check import check_mesh, with_bar
+from .mesh_check import CURVES, check_mesh, with_bar
 from .persistence import shape_order
 from .varied import Varied
 
@@ -285,13 +285,12 @@ def margin(
     varied = Varied.of(surface, what, towards)
     validate.callback("callback", callback, "a function of a Progress")
     certificate = certified(surface, True, certificate)
-    index = certificate.index
-    if index is None:
+    if (index := certificate.index) is None:
         message = f"margin: the surface is not at rest, so it has none ({certificate.verdict.value})"
         raise SurfaceError(message, what="surface", found=certificate.residual)
     find = partial(find_end, varied=varied, index=index, most=most, callback=callback)
     end, unit, notes = find(surface), varied.unit or 1.0, list[str]()
-    ends, order = [end], USUAL
+    ends, order, curves = [end], USUAL, 0.0
     if end.ends_by is MarginEnd.MESH:
         notes = [only_coarse(end.surface, standing_part(end.surface).walls.pinchable)]
     if meshes > 1 and end.ends_by is not MarginEnd.NONE:
@@ -299,6 +298,8 @@ def margin(
             check = check_mesh(surface, meshes, corners=corners, callback=callback)
             order = shape_order(check.surfaces)
             ends += map(find, check.surfaces[1:] if check.persists else ())
+            others = map(find, check.other_curves * check.persists)
+            curves = CURVES * sum(abs(other.factor - ends[1].factor) for other in others)
             doubt = "" if check.persists else f"the mesh check finds that the roof {check.verdict.value}"
         except PcmcError as error:
             ends, doubt = ends[:1], str(error)
@@ -306,15 +307,14 @@ def margin(
         shown = ", ".join(f"on {m} triangles {value:.4g} ({why})" for m, value, why in values)
         notes.append(f"no bar: {doubt}" if doubt else shown)
     numbers = np.array([[unit * one.factor] for one in ends])
-    alike = {one.ends_by in OPEN for one in ends} == {False}
-    bars = extrapolate(numbers if alike else numbers[:1], EVENT_ACCURACY * abs(numbers[0]), shape_order=order)
+    seen = numbers if {one.ends_by in OPEN for one in ends} == {False} else numbers[:1]
+    bars = extrapolate(seen, EVENT_ACCURACY * abs(numbers[0]), shape_order=order, doubt=unit * curves)
     mode, dimensions = _mode(end, index), {dimension_of(kind) for kind, _ in varied.parts}
     if end.contacts:
         at = ", ".join(f"{unit * factor:.4g}" for factor in end.contacts)
         notes.append(f"ridges come to rest, or lift off, on the way: at {at}")
-    notes.append(pressures_left_over(end.surface))
-    if certificate.symmetric_in:
-        notes.append(f"among shapes symmetric in {', '.join(certificate.symmetric_in)}")
+    symmetric = ", ".join(certificate.symmetric_in)
+    notes += [pressures_left_over(end.surface), symmetric and f"among shapes symmetric in {symmetric}"]
     return Margin(
         what=varied.what,
         more=varied.more,

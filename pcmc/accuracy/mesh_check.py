@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from ..base import validate
-from ..base.arrays import Floats, Ints
+from ..base.arrays import Ints
 from ..base.errors import OptionError, SurfaceError
 from ..base.units import NO_UNITS, Units
 from ..certificate import certify
@@ -55,6 +55,7 @@ class MeshCheck:
         the same on all meshes, to rounding, and for what swings.
     surfaces : on each mesh at rest, the one given first; a solve that failed is left out.
     curve_doubts : by quantity and ``of``, what of both bars is there as curves of the boundary are guesses.
+    other_curves : the surfaces with other guesses, refined once, from which that is known.
     """
 
     verdict: MeshVerdict
@@ -64,6 +65,7 @@ class MeshCheck:
     table: pd.DataFrame
     surfaces: tuple[Surface, ...]
     curve_doubts: Mapping[tuple[str, str], float]
+    other_curves: tuple[Surface, ...] = ()
 
     @property
     def persists(self) -> bool:
@@ -197,9 +199,11 @@ def check_mesh(
         advice = f"take finer triangles: edge_length = {finer:g} in [plan], or pcmc remesh"
         finding = finding._replace(advice=f"{advice} --edge-length {finer:g}")
     found = [readings(s, c, first.n) for s, c in zip(surfaces, certificates, strict=True)]
-    doubts = _curve_doubts(first, known, found, solved) if boundary == "smooth" else {}
+    doubted = doubted_midpoints(first, corners=known) if boundary == "smooth" and len(found) > 1 else ()
+    others = [solved(refine(first, 1, lambda _, places=places: places)) for places in doubted]
+    doubts = _curve_doubts(first, others, found)
     table = _table(found, shape_order(surfaces) if order is None else order, doubts)
-    return MeshCheck(*finding, table, tuple(surfaces), doubts)
+    return MeshCheck(*finding, table, tuple(surfaces), doubts, tuple(other.surface for other in others))
 
 
 def vertex_numbers(corners: npt.ArrayLike, n: int) -> Ints:
@@ -233,17 +237,12 @@ def _solved(start: Surface, callback: Callback | None, stable: bool) -> Result:
 
 
 def _curve_doubts(
-    first: Surface, corners: Ints, found: Sequence[dict[Key, Reading]], solved: Callable[[Surface], Result]
+    first: Surface, others: Sequence[Result], found: Sequence[dict[Key, Reading]]
 ) -> dict[tuple[str, str], float]:
     """How far limits may be off as curves are guesses: the next mesh is solved with other guesses, too."""
-
-    def read_with(places: Floats) -> dict[Key, Reading]:
-        result = solved(refine(first, 1, lambda _: places))
-        return readings(result.surface, result.certificate, first.n) if result.converged else {}
-
     doubts: dict[tuple[str, str], float] = {}
-    for other in doubted_midpoints(first, corners=corners):
-        there = read_with(other) if len(found) > 1 else {}
+    for other in others:
+        there = readings(other.surface, other.certificate, first.n) if other.converged else {}
         for key, reading in found[0].items():
             known, name = key in there and key in found[1], (reading.quantity, reading.of)
             more = CURVES * abs(found[1][key].estimate - there[key].estimate) if known else math.inf

@@ -56,12 +56,16 @@ class BarFrame:
     holds: Floats  # (r,6n) directions in which nothing moves: displacement and turn of each point
     up: Floats  # (3,) the direction that is upright
 
-    def solved(self, forces: Floats) -> FrameForces:
-        """Under forces (n,3) on the points. Where a part is not held, what is out of balance is left out."""
-        n, (factor, scale) = len(self.points), self._factor
+    def solved(self, forces: Floats, longer: Floats | float = 0.0) -> FrameForces:
+        """Under forces (n,3) on the points, with bars that are ``longer`` (b,), in their length, when free.
+        Where a part is not held, what is out of balance is left out."""
+        n, (factor, scale), push = len(self.points), self._factor, self.stiffness[:, 0] * longer
+        forces, along = forces.copy(), push[:, None] * self.axes[0][:, 0]
+        np.add.at(forces, self.bars, np.stack([-along, along], axis=1))
         load = np.pad(np.pad(forces, ((0, 0), (0, 3))).ravel(), (0, factor.shape[0] - 6 * n))
         u, held, _ = np.split(factor.solve(load), [6 * n, 6 * n + len(self.holds)])
         ends = np.einsum("bij,bjk,bk->bi", self._own, self._turn, u[self._place])
+        ends[:, [0, 6]] += np.outer(push, [1.0, -1.0])
         reactions = -scale * (self.holds.T @ held).reshape(n, 6)
         return FrameForces(self, u.reshape(n, 6)[:, :3], ends, reactions[:, :3], reactions[:, 3:])
 

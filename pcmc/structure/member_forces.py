@@ -17,7 +17,7 @@ from ..certificate.forces import Forces, cable_ends
 from ..certificate.supports import FORCE, support_table, support_vertices
 from ..forces.cables import directions, pull_along
 from ..forces.pinching import standing_part
-from ..surface.geometry import end_tangent, lengths_along, vertex_sums
+from ..surface.geometry import end_tangent, lengths_along, segment_lengths, vertex_sums
 from .frames import BarFrame, balancing_force, corner_forces, turns
 from .loads import Step
 from .members import PlacedMember
@@ -109,7 +109,11 @@ def members_in(
     X, forces = model.standing.vertices, forces_on_members(model, step, results)
     moved = np.zeros_like(X) if results is None else np.nan_to_num(results.displacements)
     frame, vertices = frame_of(model, X + moved)
-    solved = frame.solved(forces[vertices] / np.bincount(vertices)[vertices, None])
+    # the motion along a bar, where it is now, is more than its elongation if it turns: the rest has no force
+    (along, length), pairs = (frame.axes[0][:, 0], frame.axes[1]), vertices[frame.bars]
+    turned = np.einsum("bi,bi->b", along, moved[pairs[:, 1]] - moved[pairs[:, 0]]) - length
+    longer = (turned + segment_lengths(X, pairs)) / length
+    solved = frame.solved(forces[vertices] / np.bincount(vertices)[vertices, None], longer)
     if results is None:
         moved[vertices] = solved.displacements
     found, first = list[MemberForces](), 0

@@ -12,7 +12,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from generators import barrel, catenoid, cylinder, joined_caps, spherical_cap, two_caps, two_squares
 from generators.catenary import FOLD
-from pcmc import Cable, Patch, Room, Surface, certify, margin, solve
+from pcmc import Cable, Patch, Room, Surface, certify, check_mesh, margin, solve
 from pcmc.accuracy import MarginEnd
 from pcmc.accuracy.margins import End
 from pcmc.accuracy.varied import Varied, named
@@ -52,6 +52,24 @@ def test_a_coarse_end_that_does_not_settle_yet_has_no_bar(monkeypatch):
     found = margin(cap(edge_length=0.6), "pressure")
     assert found.bar == np.inf
     assert "± unknown" in found.text()
+
+
+def test_curves_that_are_guessed_are_in_the_bar(monkeypatch):
+    """An octagon beside other turns may be a curve; the end differs there by 0.1 on the next mesh."""
+    angle = np.arange(8) * np.pi / 4.0
+    rim = np.stack([(1.0 + 0.1 * np.cos(3.0 * angle)) * np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    fan = [[0, k + 1, (k + 1) % 8 + 1] for k in range(8)]
+    roof = solve(Surface([[0, 0, 0.3], *rim], fan, [0] * 8, [Patch("roof", 1.0)], fixed=range(1, 9)))
+    ends = iter((2.0, 1.9, 2.0))
+
+    def find_end(surface, *_, **__):
+        return End(MarginEnd.FOLD, next(ends, 1.8), surface, np.zeros((surface.n, 3)))
+
+    monkeypatch.setattr("pcmc.accuracy.margins.find_end", find_end)
+    guesses = len(check_mesh(roof, 2).other_curves)
+    found = margin(roof, "pressure", meshes=2)
+    assert guesses > 0
+    assert found.limit_bar >= 0.1 + 8.0 / 3.0 * 0.1
 
 
 @pytest.mark.nightly

@@ -12,8 +12,10 @@ import pcmc
 from pcmc import Patch, Surface, Verdict, certify, check_mesh, solve
 from pcmc.forces.pinching import StandingPart, pull_and_capacity, standing_part
 from pcmc.forces.wall_rows import find_walls
+from pcmc.meshing.elevation import elevate
 from pcmc.meshing.refinement import refine
 from pcmc.plan import Divider, Plan, plan_from
+from pcmc.solvers import solve_once
 from pcmc.solvers.newton import NewtonOptions, newton
 
 
@@ -247,3 +249,10 @@ def test_newton_closes_where_a_junction_is_low_over_its_bottom():
     assert found.converged
     residual = found.history[found.history["step"] == "newton"]["residual"].to_numpy()
     assert residual[-1] < 1e-3 * residual[-2]
+
+
+def test_a_wall_of_curved_elements_that_cannot_balance_says_so():
+    """That a wall which comes down is for flat triangles alone would be no reason here."""
+    sheets = example(2, 0.1).retensioned({"left": 1.0, "right": 5.0}, {"left": 0.3, "right": 0.3})
+    found = solve_once(elevate(sheets, 2)).certificate
+    assert found.verdict is Verdict.NO_EQUILIBRIUM, found.detail

@@ -51,6 +51,18 @@ def test_the_program_bends_a_clamped_beam_of_few_edges_as_the_frame_does(edges):
     assert within.deflection == pytest.approx(alone.deflection, rel=0.07)
 
 
+@needs_ccx
+def test_a_straight_beam_between_fixed_points_has_the_force_of_its_elongation():
+    """As it bends it lengthens, and held ends make a cable of it. Taken as an arch that was there from the
+    start, it had twice the force."""
+    bar = Member(polyline([[0, 1], [1, 1]]), Profile.rectangle(0.05, 0.05), Material(3e6))
+    model = model_of(square(8, tension=2.0), members=[bar], material=Material(1e3), anyway=True)
+    [beam] = analyse(model, remedy=False).cases[0].members
+    moved = beam.points + beam.displacements
+    stretch = np.linalg.norm(np.diff(moved, axis=0), axis=1).sum() - 1.0
+    assert beam.within[:, 0].mean() == pytest.approx(0.05**2 * 3e6 * stretch, rel=0.02)
+
+
 def test_a_beam_whose_end_slides_along_it_bends_as_one_with_both_ends_held():
     """On a circle that touches its line, the end neither leaves the line nor turns about it."""
     film = square(8, tension=2.0).retensioned(None, {"film": 1.0})
