@@ -45,6 +45,11 @@ def start_of(project: Project) -> Outcome:
             raise OptionError(text, what="force", found=force, expected=own)
         units = Units(data.units.length, force or own)
         surface, targets, vary = first_tensions(surface, project.mesh)
+        typed = targets and project.mesh.rises[0].kind in project.data.get("mesh", ())
+        for name in vary[0].names if typed else ():
+            if "tension" in project.mesh.patches.get(name, ()):  # the command's --rise takes its place
+                text = f"{project.path}: the mesh has {project.mesh.rises[0].kind} and a tension of {name!r},"
+                raise OptionError(f"{text} which is found for it; leave out one", what="mesh.patches")
         if targets:
             project = replace(project, targets=[*project.targets, *targets], vary=[*project.vary, *vary])
         return Outcome.of(surface, units, project, data)

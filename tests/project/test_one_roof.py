@@ -267,6 +267,7 @@ def test_supports_of_a_mesh_are_points_and_lines(mesh):
         ('supports = "walls"', "mesh.supports"),
         ("patches = {rof = {tension = 1}}", "patch"),
         ("tension = -1", "mesh.tension"),
+        ("rise = 0.8\npatches = {roof = {tension = 7.0}}", "mesh.patches"),
     ],
 )
 def test_bad_values_of_a_mesh_are_refused_in_one_line(mesh, line, what):
