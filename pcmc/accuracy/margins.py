@@ -271,7 +271,7 @@ def margin(
     >>> disc = Surface([[0, 0, 0.3], *rim], [[0, k + 1, (k + 1) % 12 + 1] for k in range(12)], [0] * 12,
     ...                [Patch("cap", 0.8)], fixed=range(1, 13))
     >>> from pcmc.meshing.refinement import refine
-    >>> found = margin(solve_once(refine(disc)), "pressure")
+    >>> found = margin(solve_once(refine(disc, 1, lambda X: X / np.hypot(*X.T[:2])[:, None])), "pressure")
     >>> found.ends_by.name, found.where, bool(abs(found.factor - 1.6) <= found.bar)
     ('FOLD', 'the roof inflates', True)
     """
