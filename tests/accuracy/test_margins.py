@@ -100,12 +100,13 @@ def test_the_heaviest_long_strip():
 
 @pytest.mark.nightly
 def test_the_heaviest_rope():
-    """z + τ/g = c cosh(x/c) from ±1 at z = 1 only where τ/g + 1 ≥ cosh(t)/t."""
-    rope = solve(hanging(8)).surface
+    """z + τ/g = c cosh(x/c) from ±1 at z = 1 only where τ/g + 1 ≥ cosh(t)/t. With 8 segments in place of 12 the
+    fold is off by 1.001 times its bar: the order is not yet 2."""
+    rope = solve(hanging(12)).surface
     found = margin(rope, "weight")
     exact = 1.0 / (np.cosh(FOLD) / FOLD - 1.0)
     assert found.ends_by is MarginEnd.FOLD
-    assert abs(found.factor - exact) <= found.bar <= 0.05 * exact
+    assert abs(found.factor - exact) <= found.bar <= 0.02 * exact
     heavier = [margin(rope, what, meshes=1) for what in ("cable_weight", "weight of cable rope")]
     assert [one.factor for one in heavier] == pytest.approx([found.factor] * 2, rel=1e-6)
     assert "times the weights of cables" in heavier[0].text()
