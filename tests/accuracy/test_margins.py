@@ -100,8 +100,8 @@ def test_the_heaviest_long_strip():
 
 @pytest.mark.nightly
 def test_the_heaviest_rope():
-    """z + τ/g = c cosh(x/c) from ±1 at z = 1 only where τ/g + 1 ≥ cosh(t)/t. With 8 segments in place of 12 the
-    fold is off by 1.001 times its bar: the order is not yet 2."""
+    """z + τ/g = c cosh(x/c) from ±1 at z = 1 only where τ/g + 1 ≥ cosh(t)/t. With 8 segments, not 12,
+    the fold is off by 1.001 times its bar: the order is not yet 2."""
     rope = solve(hanging(12)).surface
     found = margin(rope, "weight")
     exact = 1.0 / (np.cosh(FOLD) / FOLD - 1.0)
