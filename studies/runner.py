@@ -23,6 +23,7 @@ THREADS = ("PCMC_THREADS", "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM
 # Kernels that every x86-64 processor has. Others round otherwise, and the answer of a roof at the edge of its
 # existence hangs on that: with its own kernels each machine would have other numbers.
 KERNELS = {"MKL_CBWR": "COMPATIBLE", "OPENBLAS_CORETYPE": "Nehalem"}
+OFF = "NPY_DISABLE_CPU_FEATURES"  # numpy's, by name
 
 WORKER = (sys.executable, "-m", "studies.worker")
 
@@ -32,8 +33,9 @@ def environment(study: Study) -> dict[str, str]:
     variables = os.environ | dict.fromkeys(THREADS, "1")
     if study.timed:
         return variables
-    beyond = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
-    return variables | KERNELS | {"NPY_DISABLE_CPU_FEATURES": " ".join(beyond)}
+    beyond = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    off = " ".join([os.environ.get(OFF, ""), *beyond]).strip()
+    return variables | KERNELS | ({OFF: off} if off else {})
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from studies.__main__ import main
 from studies.folder import Folder, mesh_hash
 from studies.paper import read_measured
 from studies.registry import STUDIES, chosen
-from studies.runner import environment, run_all
+from studies.runner import OFF, THREADS, environment, run_all
 from studies.study import perform
 from studies.worker import main as work
 from tests.studies.tiny_study import tiny_study
@@ -168,14 +168,20 @@ def test_a_failing_or_crashing_study_is_an_outcome_and_the_others_go_on(tmp_path
     assert outcomes[1].error == outcomes[3].error == ""
 
 
-def test_a_process_rounds_as_on_every_processor_unless_its_times_count():
-    script = "import numpy as np; print(np.show_config(mode='dicts')['SIMD Extensions'].get('found'))"
+def test_a_process_rounds_as_on_every_processor_unless_its_times_count(monkeypatch):
+    script = "import numpy as np; print(np.show_config(mode='dicts')['SIMD Extensions'].get('found', []))"
     tiny = tiny_study()
-    with_common = subprocess.run([sys.executable, "-c", script], env=environment(tiny), capture_output=True)
-    assert with_common.stdout.strip() in (b"None", b"[]"), with_common.stderr
+    common = environment(tiny)
+    found = subprocess.run([sys.executable, "-c", script], env=common, capture_output=True, check=True)
+    assert found.stdout.strip() == b"[]"
     timed = environment(replace(tiny, timed=True))
-    assert timed["OMP_NUM_THREADS"] == "1"
-    assert "MKL_CBWR" not in timed or "MKL_CBWR" in os.environ
+    assert timed == os.environ | dict.fromkeys(THREADS, "1")
+    config = {"SIMD Extensions": {"baseline": ["X86_V2"]}}  # of a processor that has no more
+    monkeypatch.setattr("numpy.show_config", lambda mode: config)
+    monkeypatch.setenv(OFF, "X86_V4")
+    assert environment(tiny)[OFF] == "X86_V4"
+    monkeypatch.delenv(OFF)
+    assert OFF not in environment(tiny)
 
 
 def test_interrupt_ends_the_processes_under_way(tmp_path):
