@@ -40,15 +40,11 @@ class MemberForces:
 
     line: PlacedMember
     points: Floats  # (k,3) of the form
-    within: Floats  # (k,6) N, V, V across, T, M, M across; see ``FrameForces.within``
+    within: Floats  # (r,6) N, V, V across, T, M, M across; see ``FrameForces.within``
+    at: Ints  # (r,) the points of its line's path at which these are
     displacements: Floats  # (k,3)
     pulls: Floats  # (k,3) forces of the sheets and loads on it
     buckling: float  # the factor on N along it at which it buckles alone; see ``BarFrame.buckling``
-
-    @cached_array
-    def along(self) -> Floats:
-        """(k,) the length along it from its first point."""
-        return lengths_along(self.points)
 
     @property
     def span(self) -> float:
@@ -120,8 +116,10 @@ def members_in(
     for line in model.beams:
         v, bars, N = line.vertices, first + np.arange(len(line.pairs)), np.zeros(len(frame.bars))
         N[bars] = 0.5 * (solved.ends[bars, 6] - solved.ends[bars, 0])
-        within, buckling = solved.within(bars, line.closed), frame.buckling(N)
-        found.append(MemberForces(line, X[v], within, moved[v], forces[v], buckling))
+        buckling = frame.buckling(N)
+        found.append(
+            MemberForces(line, X[v], *solved.within(bars, line.closed), moved[v], forces[v], buckling)
+        )
         first += len(bars)
     return tuple(found)
 
@@ -220,7 +218,7 @@ def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tupl
     """A row per case and beam: ``least_N`` and ``largest_N``, tension above 0; the largest shear force ``V``
     and moment ``M``, in whichever direction; the largest displacement ``moved``, and ``span_over``, the span
     over it; ``buckling``, the factor on N at which it buckles, held by no sheets, else NaN. And a row per
-    case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``; ``pull`` and
+    case and place of each, see ``FrameForces.within``: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``; ``pull`` and
     ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``."""
     rows, along = list[dict[str, object]](), [pd.DataFrame()]
     for case, beam in ((case, beam) for case, beams in cases for beam in beams):
@@ -228,7 +226,8 @@ def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tupl
         over = beam.span / moved.max() if moved.any() else np.inf
         rows.append({**about, **beam.largest, "moved": beam.deflection, "span_over": over})
         rows[-1]["buckling"] = beam.buckling if beam.buckling < np.inf else np.nan
-        columns = [beam.along[:, None], beam.points, beam.within, beam.wall_tensions, moved[:, None]]
+        at, s = beam.at % len(beam.points), lengths_along(beam.line.path)[beam.at, None]
+        columns = [s, beam.points[at], beam.within, beam.wall_tensions[at], moved[at, None]]
         along.append(pd.DataFrame(about | dict(zip(COLUMNS, np.hstack(columns).T, strict=True))))
     return pd.DataFrame(rows), pd.concat(along[1:] or along, ignore_index=True)
 
