@@ -172,9 +172,8 @@ class FrameForces:
         frame, axes, count = self.frame, self.frame.axes[0][chain], len(self.frame.points)
         holds = frame.holds.reshape(-1, count, 6)[:, :, :3].any(axis=2).sum(axis=0)
         ends = ((np.bincount(frame.bars.ravel(), minlength=count) > 2) | (holds > 1))[frame.bars[chain, 0]]
-        ends |= np.einsum("bij,bij->bi", axes, np.roll(axes, 1, axis=0)).min(axis=1) < np.cos(
-            np.radians(CORNER)
-        )
+        cosines = np.einsum("bij,bij->bi", axes, np.roll(axes, 1, axis=0))
+        ends |= cosines.min(axis=1) < np.cos(np.radians(CORNER))
         ends[0] |= not closed
         if not ends.any():
             rows = self._along(chain, True)

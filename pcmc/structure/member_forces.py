@@ -11,7 +11,7 @@ import pandas as pd
 from scipy.linalg import orth
 from scipy.spatial.distance import pdist
 
-from ..base.arrays import Floats, Ints, cached_array, kept_with_owner
+from ..base.arrays import Floats, Ints, kept_with_owner
 from ..base.units import Units
 from ..certificate.forces import Forces, cable_ends
 from ..certificate.supports import FORCE, support_table, support_vertices
@@ -116,10 +116,8 @@ def members_in(
     for line in model.beams:
         v, bars, N = line.vertices, first + np.arange(len(line.pairs)), np.zeros(len(frame.bars))
         N[bars] = 0.5 * (solved.ends[bars, 6] - solved.ends[bars, 0])
-        buckling = frame.buckling(N)
-        found.append(
-            MemberForces(line, X[v], *solved.within(bars, line.closed), moved[v], forces[v], buckling)
-        )
+        within = solved.within(bars, line.closed)
+        found.append(MemberForces(line, X[v], *within, moved[v], forces[v], frame.buckling(N)))
         first += len(bars)
     return tuple(found)
 
@@ -218,8 +216,8 @@ def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tupl
     """A row per case and beam: ``least_N`` and ``largest_N``, tension above 0; the largest shear force ``V``
     and moment ``M``, in whichever direction; the largest displacement ``moved``, and ``span_over``, the span
     over it; ``buckling``, the factor on N at which it buckles, held by no sheets, else NaN. And a row per
-    case and place of each, see ``FrameForces.within``: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``; ``pull`` and
-    ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``."""
+    case and place of each, as of ``FrameForces.within``: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …,
+    ``moved``; ``pull`` and ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``."""
     rows, along = list[dict[str, object]](), [pd.DataFrame()]
     for case, beam in ((case, beam) for case, beams in cases for beam in beams):
         about, moved = {"case": case, "member": beam.line.name}, np.linalg.norm(beam.displacements, axis=1)
