@@ -170,15 +170,15 @@ def frame_of(model: StructuralModel, X: Floats) -> tuple[BarFrame, Ints]:
 
 
 def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:
-    """By the ``member_nodes`` at fixed ends of beams, the turns (k,3) that are held there, as unit vectors at
-    right angles: the twist of hinged ends on X (n,3), all of clamped ones."""
+    """By the ``member_nodes`` at held ends of beams, the turns (k,3) that are held there, as unit vectors at
+    right angles: the twist of hinged ends on X (n,3) if they are fixed, all of clamped ones."""
     given = dict[int, list[Floats]]()
     for line, places in zip(model.beams, model.member_nodes[1], strict=True):
         t, length = directions(X, line.pairs)
         for end, two in ((0, slice(2)), (-1, slice(None, -3, -1))):
             v = line.vertices[end]
-            if not line.closed and model.held[v] and model.freedom[v] == 0:
-                clamped = line.member.ends == "clamped"
+            clamped = line.member.ends == "clamped"
+            if not line.closed and model.held[v] and (clamped or model.freedom[v] == 0):
                 turns = np.eye(3) if clamped else end_tangent(t[two], length[two])[None]
                 given.setdefault(int(places[end]), []).extend(turns)
     return {node: orth(np.array(held).T, ALIKE).T for node, held in given.items()}
