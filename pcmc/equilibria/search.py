@@ -138,9 +138,12 @@ def find_equilibria(
     expect_flat(given, "find_equilibria")
     validate.callback("callback", callback, "a function of a sentence")
     chosen = validate.options_from(SearchOptions, "find_equilibria", options)
-    single = isinstance(along, str | Direction | BoundaryMotion)
-    every = [along] if single else validate.sequence("along", along)
+    every = [along] if isinstance(along, Along) else validate.sequence("along", along)
     lines = [TracedParameter.of(given, what, chosen.span) for what in every]
+    names = [line.name for line in lines]
+    lines = [
+        replace(x, name=f"{x.name} {k}") if names.count(x.name) > 1 else x for k, x in enumerate(lines, 1)
+    ]
     search = _Search(given, lines, chosen, callback)
     try:
         search.run()
@@ -160,7 +163,7 @@ class _Search:
     callback: Callable[[str], None] | None
     found: list[FoundEquilibrium] = field(default_factory=list)
     shapes: list[Shape] = field(default_factory=list)
-    on_branch: set[int] = field(default_factory=set)  # those that a branch has led to
+    on_branch: set[tuple[str, int]] = field(default_factory=set)  # those that a branch in this has led to
     ways: list[WayDown] = field(default_factory=list)
     branches: dict[str, list[Branch]] = field(default_factory=lambda: defaultdict(list))
     left: dict[str, list[tuple[float, Shape]]] = field(default_factory=lambda: defaultdict(list))
@@ -174,8 +177,8 @@ class _Search:
         self.tell("solving")
         self.first()
         for number, _ in enumerate(self.found):  # it grows on the way
-            if number not in self.on_branch:
-                for line in self.lines:
+            for line in self.lines:
+                if (line.name, number) not in self.on_branch:
                     self.follow(line, number)
             self.descend(number)
             self.deflate(number)
@@ -202,8 +205,7 @@ class _Search:
                 text = f"find_equilibria: no equilibrium was found to begin with; {result.message}"
                 raise SurfaceError(text, what="surface", found=result.status.name)
             self.add(result.surface, "from the start given")
-        low = low_start(self.surface)
-        if low is not None and (result := solve(low)).converged:
+        if (low := low_start(self.surface)) is not None and (result := solve(low)).converged:
             self.add(with_good_triangles(result.surface), "from a low start")
 
     def add(self, surface: Surface, how: str) -> int | None:
@@ -278,7 +280,7 @@ class _Search:
         if k is None:
             self.failed.append(f"A branch passes {now}, but its equilibrium there cannot be certified.")
             return
-        self.on_branch.add(k)
+        self.on_branch.add((line.name, k))
         if beside and k in led_to:
             back = f"the way from there to {line.value:.4g} leads back to a known equilibrium"
             self.failed.append(f"A branch left at {line.name} {beside}; {back}. Try a finer mesh.")

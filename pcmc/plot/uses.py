@@ -127,7 +127,6 @@ def member_forces(
     names = members or tuple(name for name in largest.index if name in largest.nlargest(MOST).index)
     force, length = units.force or "force", units.length or "length"
     rows = {"N": force, "V": force, "M": f"{force}·{length}"}
-    rings = {beam.name: beam.length for beam in analysis.model.beams if beam.closed}
     columns = min(len(names), BESIDE)
     count = len(rows) * -(-len(names) // columns)
     figure = new(width, HIGH * count, pad=8.0)
@@ -140,8 +139,6 @@ def member_forces(
             place.axhline(0.0, color=INK, linewidth=0.6)
             for color, case in zip(CURVES, drawn, strict=False):
                 along = own[own["case"] == case]
-                if name in rings:  # back to the point where it begins
-                    along = along.iloc[[*range(len(along)), 0]].assign(s=[*along["s"], rings[name]])
                 place.plot(along["s"], along[column], color=color, linewidth=1.1, label=case)
                 across = along.get(f"{column}_across")
                 if across is not None and np.abs(across).max() > SMALL_SHARE * np.abs(own[column]).max():

@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_array, triu
 
-from ..base.arrays import Bools, Floats
+from ..base.arrays import Bools, Floats, Ints
 from ..base.tolerances import PARALLEL
 from ..forces.motion_space import MotionSpace, VertexClasses, perpendicular
 from ..forces.pattern import Pattern, hessian_pattern
 from ..forces.second_variation import assemble
-from ..stability.factorisation import factoriser
+from ..stability.factorisation import Factor, factoriser
 from ..surface import Surface
 from ..surface.supports import apply_supports
 from ..surface.topology import SHEET
@@ -45,15 +45,8 @@ class Smoother:
         faces = {name: getattr(surface, name) for name in ("faces", "patch_of_face", "topology")}
         self._classes = replace(classes, active=np.ones(surface.m, dtype=bool), nodes=surface.nodes, **faces)
         used = np.bincount(surface.topology.faces.ravel(), minlength=surface.n) > 0
-        self._surface, self._axes = surface, _axes(surface)
-        self._parts = np.where(used, surface.topology.components, -1)
-        planes = ((surface.plane, surface.on_plane | surface.given_supports.on_plane), *surface.on_planes)
-        masks = []  # (n,) by axis, the vertices that are free along it
-        for axis in self._axes:
-            across = [on for plane, on in planes if np.linalg.norm(np.cross(axis, plane.normal)) <= PARALLEL]
-            masks.append(used & ~np.logical_or.reduce([surface.pinned, *across]))
-        # the distinct ones of these masks, and (3,) which of them each axis has
-        self._free, self._number = np.unique(masks, axis=0, return_inverse=True)
+        self._surface, self._parts = surface, np.where(used, surface.topology.components, -1)
+        self._axes, self._free, self._number = _free_along_axes(surface, used & ~surface.pinned)
         self._spaces = [_one_unknown_each(free) for free in self._free]
         self._patterns = [hessian_pattern(self._classes, space) for space in self._spaces]
         self._factorisers = [factoriser(pattern, backend) for pattern in self._patterns]
@@ -82,6 +75,18 @@ class Smoother:
             out[place] = factor.solve(local[place] - loose * mean[part])
         out = out @ self._axes
         return self._surface.spread(apply_supports(self._surface, out) if self._surface.on_planes else out)
+
+
+def _free_along_axes(surface: Surface, movable: Bools) -> tuple[Floats, Bools, Ints]:
+    """Axes (3,3), rows; the distinct masks (k,n) of movable vertices that no plane holds along an axis; and
+    (3,) which of these masks each axis has.
+    """
+    axes, masks = _axes(surface), list[Bools]()
+    planes = ((surface.plane, surface.on_plane | surface.given_supports.on_plane), *surface.on_planes)
+    for axis in axes:
+        across = [on for plane, on in planes if np.linalg.norm(np.cross(axis, plane.normal)) <= PARALLEL]
+        masks.append(movable & ~np.logical_or.reduce([~movable, *across]))
+    return axes, *np.unique(masks, axis=0, return_inverse=True)
 
 
 def _axes(surface: Surface) -> Floats:
@@ -116,7 +121,8 @@ class HarmonicExtension:
     """Lets the inside of the sheets follow the motion of their curves, or of ``prescribed`` (n,) vertices.
 
     The motion is extended harmonically into the sheets, L with equal tensions: with the inside i and the
-    curves c,  L_ii w_i = -L_ic w_c. Each sheet vertex takes the part of w along its sheet, which does not
+    curves c,  L_ii w_i = -L_ic w_c. Vertices that slide on a plane stay on it, so that triangles beside a
+    mirror plane move as in the whole. Each sheet vertex takes the part of w along its sheet, which does not
     change the shape, as far as its support lets it.
     """
 
@@ -137,15 +143,8 @@ class HarmonicExtension:
         L = pattern.symmetric(_laplacian(equal, classes, space, pattern, X))
         curves = (classes.kind != SHEET) | surface.fixed
         self._surface, self._prescribed = surface, curves if prescribed is None else prescribed
-        self._inside, self._given = used & ~self._prescribed, used & self._prescribed
-        inside = self._inside[used]
-        self._coupling = csr_array(L[inside][:, ~inside])
-        upper = csr_array(triu(L[inside][:, inside]))
-        upper.sort_indices()
-        diagonal = upper.diagonal()  # in units of it no weak pivot looks like zero
-        units = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-        pattern = Pattern(upper.indptr, upper.indices, np.empty((0, 3), dtype=np.int32))
-        self._factor = factoriser(pattern, backend, units).factor(upper.data)
+        self._axes, free, self._number = _free_along_axes(surface, used & ~self._prescribed)
+        self._parts = [(inside, used & ~inside, *_blocks(L, inside[used], backend)) for inside in free]
 
     def extend(self, space: MotionSpace, motion: Floats) -> Floats:
         """The motion (n,3) with the sheets' vertices following the curves."""
@@ -156,6 +155,18 @@ class HarmonicExtension:
 
     def harmonic(self, motion: Floats) -> Floats:
         """w (n,3), as ``motion`` where it is prescribed."""
-        w = np.where(self._prescribed[:, None], motion, 0.0)
-        w[self._inside] = -self._factor.solve(self._coupling @ w[self._given])
-        return w
+        w = np.where(self._prescribed[:, None], motion, 0.0) @ self._axes.T
+        for number, (inside, given, coupling, factor) in enumerate(self._parts):
+            along = self._number == number
+            w[np.ix_(inside, along)] = -factor.solve(coupling @ w[np.ix_(given, along)])
+        return w @ self._axes
+
+
+def _blocks(L: csr_array, inside: Bools, backend: str | None) -> tuple[csr_array, Factor]:
+    """L_ic, and L_ii factorised."""
+    upper = csr_array(triu(L[inside][:, inside]))
+    upper.sort_indices()
+    diagonal = upper.diagonal()  # in units of it no weak pivot looks like zero
+    units = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    pattern = Pattern(upper.indptr, upper.indices, np.empty((0, 3), dtype=np.int32))
+    return csr_array(L[inside][:, ~inside]), factoriser(pattern, backend, units).factor(upper.data)

@@ -35,9 +35,10 @@ from scipy.sparse import block_array, coo_array, csr_array
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from ..base.arrays import Floats, Ints
-from ..surface.geometry import area_vectors, edge_vectors, end_tangent, unit_vectors
+from ..surface.geometry import CORNER, area_vectors, edge_vectors, end_tangent, unit_vectors
 from ..surface.topology import components
 
+STRAIGHT = 1e-6  # sine of the largest turn of a line below which it is straight
 UPRIGHT = 1e-6  # sine of the angle to the upright below which a bar stands: its z is another direction
 EXACT = 1e-10  # of the factor at which bars buckle
 NEVER = 1e4  # factor from which it is rounding, as of a ring in tension, and they do not buckle
@@ -160,12 +161,31 @@ class FrameForces:
     reactions: Floats  # (n,3) forces of the supports on the frame
     moments: Floats  # (n,3) their moments
 
-    def within(self, chain: Ints, closed: bool = False) -> Floats:
-        """(k,6) along bars (c,), each from where the one before ends, at their k points: N, tension above 0;
+    def within(self, chain: Ints, closed: bool = False) -> tuple[Floats, Ints]:
+        """(k,6) along bars (c,), each from where the one before ends, at their points: N, tension above 0;
         the shear forces upright and across; the torque; the moments upright, above 0 with tension below, and
-        across. V = dM/ds. Moments are those at the points, about the bars' axes; the other forces jump there,
-        as loads do. Both are taken on the line between the middles of the two bars at a point; at ends forces
-        are on the line through the two nearest ones, and moments about the axes of the ``end_tangent``."""
+        across; and (k,) the points 0 to c, of a closed line the first again at its end. V = dM/ds. Moments
+        are those at the points, about the bars' axes; the other forces jump there, as loads do: they are on
+        the line between the middles of the two bars. A point has two rows, one for each side, where the line
+        has a corner, other bars meet it, or a support holds it. There and at ends forces are on the line
+        through the two nearest middles, and moments about the axes of the ``end_tangent``."""
+        frame, axes, count = self.frame, self.frame.axes[0][chain], len(self.frame.points)
+        holds = frame.holds.reshape(-1, count, 6)[:, :, :3].any(axis=2).sum(axis=0)
+        ends = ((np.bincount(frame.bars.ravel(), minlength=count) > 2) | (holds > 1))[frame.bars[chain, 0]]
+        cosines = np.einsum("bij,bij->bi", axes, np.roll(axes, 1, axis=0))
+        ends |= cosines.min(axis=1) < np.cos(np.radians(CORNER))
+        ends[0] |= not closed
+        if not ends.any():
+            rows = self._along(chain, True)
+            return np.vstack([rows, rows[:1]]), np.arange(len(chain) + 1)
+        first, order = int(ends.argmax()), np.arange(len(chain))
+        runs = np.split(np.roll(order, -first), np.flatnonzero(np.roll(ends, -first))[1:])
+        rows = np.vstack([self._along(chain[run]) for run in runs])
+        at = np.concatenate([np.append(run, run[-1] + 1) for run in runs])
+        return np.roll(rows, -at.argmin(), axis=0), np.roll(at, -at.argmin())
+
+    def _along(self, chain: Ints, closed: bool = False) -> Floats:
+        """(k,6) the same along a line without corners, at its c points if it is closed, else c + 1."""
         columns, signs = [0, 2, 1, 3, 4, 5], [1.0, -1.0, -1.0, 1.0, -1.0, 1.0]
         first, last = -self.ends[chain, :6][:, columns] * signs, self.ends[chain, 6:][:, columns] * signs
         middle, before, after = 0.5 * (first + last)[:, :4], last[:, 4:], first[:, 4:]
@@ -267,7 +287,7 @@ def balancing_force(P: Floats, pulls: Floats, closed: bool) -> tuple[float, floa
     """
     inner = slice(None) if closed else slice(1, -1)
     turn, f = turns(P, closed)[inner], pulls[inner]
-    if not (f.any() and turn.any()):
+    if not f.any() or np.abs(turn).max() < STRAIGHT:
         return 0.0, float(f.any())
     N = -float((f * turn).sum() / (turn * turn).sum())
     return N, float(np.linalg.norm(f + N * turn) / np.linalg.norm(f))

@@ -155,7 +155,7 @@ def _ties(model: StructuralModel) -> Iterator[str]:
         stops = {0: "123", 1: "23", 2: "1", 3: ""}[model.freedom[v] if model.held[v] else 3]
         if k in turns or stops not in ("", "123"):
             axes = model.axes[v]
-            if k in turns:  # those that are held first
+            if k in turns and stops == "123":  # those that are held first
                 held = _stopped_about(model, k, turns[k])
                 axes = held if len(held) > 1 else np.concatenate([held, *perpendicular(held)])
             yield f"*NSET, NSET=BEAM_{node}\n{node}\n"

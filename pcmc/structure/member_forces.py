@@ -11,7 +11,7 @@ import pandas as pd
 from scipy.linalg import orth
 from scipy.spatial.distance import pdist
 
-from ..base.arrays import Floats, Ints, cached_array, kept_with_owner
+from ..base.arrays import Floats, Ints, kept_with_owner
 from ..base.units import Units
 from ..certificate.forces import Forces, cable_ends
 from ..certificate.supports import FORCE, support_table, support_vertices
@@ -40,15 +40,11 @@ class MemberForces:
 
     line: PlacedMember
     points: Floats  # (k,3) of the form
-    within: Floats  # (k,6) N, V, V across, T, M, M across; see ``FrameForces.within``
+    within: Floats  # (r,6) N, V, V across, T, M, M across; see ``FrameForces.within``
+    at: Ints  # (r,) the points of its line's path at which these are
     displacements: Floats  # (k,3)
     pulls: Floats  # (k,3) forces of the sheets and loads on it
     buckling: float  # the factor on N along it at which it buckles alone; see ``BarFrame.buckling``
-
-    @cached_array
-    def along(self) -> Floats:
-        """(k,) the length along it from its first point."""
-        return lengths_along(self.points)
 
     @property
     def span(self) -> float:
@@ -120,8 +116,8 @@ def members_in(
     for line in model.beams:
         v, bars, N = line.vertices, first + np.arange(len(line.pairs)), np.zeros(len(frame.bars))
         N[bars] = 0.5 * (solved.ends[bars, 6] - solved.ends[bars, 0])
-        within, buckling = solved.within(bars, line.closed), frame.buckling(N)
-        found.append(MemberForces(line, X[v], within, moved[v], forces[v], buckling))
+        within = solved.within(bars, line.closed)
+        found.append(MemberForces(line, X[v], *within, moved[v], forces[v], frame.buckling(N)))
         first += len(bars)
     return tuple(found)
 
@@ -174,15 +170,15 @@ def frame_of(model: StructuralModel, X: Floats) -> tuple[BarFrame, Ints]:
 
 
 def held_turns(model: StructuralModel, X: Floats) -> dict[int, Floats]:
-    """By the ``member_nodes`` at fixed ends of beams, the turns (k,3) that are held there, as unit vectors at
-    right angles: the twist of hinged ends on X (n,3), all of clamped ones."""
+    """By the ``member_nodes`` at held ends of beams, the turns (k,3) that are held there, as unit vectors at
+    right angles: the twist of hinged ends on X (n,3) if they are fixed, all of clamped ones."""
     given = dict[int, list[Floats]]()
     for line, places in zip(model.beams, model.member_nodes[1], strict=True):
         t, length = directions(X, line.pairs)
         for end, two in ((0, slice(2)), (-1, slice(None, -3, -1))):
             v = line.vertices[end]
-            if not line.closed and model.held[v] and model.freedom[v] == 0:
-                clamped = line.member.ends == "clamped"
+            clamped = line.member.ends == "clamped"
+            if not line.closed and model.held[v] and (clamped or model.freedom[v] == 0):
                 turns = np.eye(3) if clamped else end_tangent(t[two], length[two])[None]
                 given.setdefault(int(places[end]), []).extend(turns)
     return {node: orth(np.array(held).T, ALIKE).T for node, held in given.items()}
@@ -220,15 +216,16 @@ def member_tables(cases: Iterable[tuple[str, tuple[MemberForces, ...]]]) -> tupl
     """A row per case and beam: ``least_N`` and ``largest_N``, tension above 0; the largest shear force ``V``
     and moment ``M``, in whichever direction; the largest displacement ``moved``, and ``span_over``, the span
     over it; ``buckling``, the factor on N at which it buckles, held by no sheets, else NaN. And a row per
-    case and point of each: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …, ``moved``; ``pull`` and
-    ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``."""
+    case and place of each, as of ``FrameForces.within``: ``s`` along it, ``x``, ``y``, ``z``, ``N``, …,
+    ``moved``; ``pull`` and ``pull_unbent``, force/length, as of ``MemberForces.wall_tensions``."""
     rows, along = list[dict[str, object]](), [pd.DataFrame()]
     for case, beam in ((case, beam) for case, beams in cases for beam in beams):
         about, moved = {"case": case, "member": beam.line.name}, np.linalg.norm(beam.displacements, axis=1)
         over = beam.span / moved.max() if moved.any() else np.inf
         rows.append({**about, **beam.largest, "moved": beam.deflection, "span_over": over})
         rows[-1]["buckling"] = beam.buckling if beam.buckling < np.inf else np.nan
-        columns = [beam.along[:, None], beam.points, beam.within, beam.wall_tensions, moved[:, None]]
+        at, s = beam.at % len(beam.points), lengths_along(beam.line.path)[beam.at, None]
+        columns = [s, beam.points[at], beam.within, beam.wall_tensions[at], moved[at, None]]
         along.append(pd.DataFrame(about | dict(zip(COLUMNS, np.hstack(columns).T, strict=True))))
     return pd.DataFrame(rows), pd.concat(along[1:] or along, ignore_index=True)
 

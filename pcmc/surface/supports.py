@@ -342,14 +342,16 @@ def uncancelled_pressures(topo: Topology, pressure: Floats, masks: Sequence[Bool
 
 
 def common_point(point: Floats, planes: Sequence[Plane]) -> Floats:
-    """(3,) the point nearest to ``point`` that lies on the first plane and on as many more as possible.
+    """(3,) the point nearest to ``point`` that lies on the first plane and on as many more as possible, those
+    that are near before others, in whichever order they are given.
 
     >>> wall = Plane((2, 0, 0), (1, 0, 0))
     >>> common_point(np.zeros(3), [Plane(), wall, Plane((5, 0, 0), (1, 0, 0))]).tolist()
     [2.0, 0.0, 0.0]
     """
-    chosen: list[Plane] = []
-    for plane in planes:
+    chosen, off = list[Plane](), {plane: abs(float(plane.height(point))) for plane in planes}
+    near = {plane: (round(by / (1.0 + max(off.values())), 9), plane.normal) for plane, by in off.items()}
+    for plane in [*planes[:1], *sorted(planes[1:], key=lambda p: (*near[p], p.point))]:
         normals = np.array([p.normal for p in (*chosen, plane)])
         away = -np.array([float(p.height(point)) for p in (*chosen, plane)])
         move = np.linalg.lstsq(normals, away, rcond=PARALLEL)[0]

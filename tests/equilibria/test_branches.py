@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 import volume_cases
 from programs import needs_evolver
+from shapes import cap
 
 from generators import (
     cylinder,
@@ -17,7 +18,7 @@ from generators import (
 )
 from generators.grid import grid_faces
 from pcmc import BoundaryMotion, Cable, Direction, Patch, Plane, Room, Surface, find_equilibria, solve
-from pcmc.equilibria import branches
+from pcmc.equilibria import branches, search
 from pcmc.solvers.continuation import Branch, Ending
 from studies.reference import evolver
 
@@ -182,3 +183,19 @@ def test_the_line_may_be_a_direction_and_the_boundary():
     found = find_equilibria(cap, wider, starts=0)
     assert [one.index for one in found.found] == [0, 1]
     assert found.branches["boundary"][0].folds.parameter[0] == pytest.approx(1.2, abs=0.05)
+
+
+def test_each_equilibrium_is_followed_in_each_parameter(monkeypatch):
+    """Two caps that do not touch: small or large each, so four equilibria."""
+    monkeypatch.setattr(search._Search, "descend", lambda *_: None)
+    one, other = cap(2, 0.52), cap(2, 0.5)
+    patches, aside = [Patch("left", 0.52), Patch("right", 0.5)], [3.0, 0.0, 0.0]
+    X, F = np.concatenate([one.vertices, other.vertices + aside]), [*one.faces, *(other.faces + one.n)]
+    caps = Surface(X, F, np.repeat([0, 1], one.m), patches, fixed=np.tile(one.fixed, 2))
+    loads = [Direction(pressures={patch.name: 1.0}) for patch in patches]
+    found = find_equilibria(caps, loads, starts=0, span=(0.9, 1.2))
+    assert [one.index for one in found.found] == [0, 1, 1, 2]
+    assert {name: len(branches) for name, branches in found.branches.items()} == {
+        "parameter 1": 2,
+        "parameter 2": 2,
+    }

@@ -1,6 +1,7 @@
 """Pressures that differ from patch to patch, and the point of Π that volumes are seen from."""
 
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -80,6 +81,27 @@ def test_far_from_the_plane_s_point_volumes_are_seen_from_near_by():
     np.testing.assert_allclose(gradient(far), gradient(near), atol=1e-8 * np.abs(gradient(near)).max())
     assert volume(far) == pytest.approx(volume(near), rel=1e-8)
     assert far.moved(far.vertices + np.array([1e3, 0, 0])).origin is far.origin
+
+
+def test_energy_does_not_depend_on_the_order_of_planes_without_a_common_point():
+    """Of three walls around a raised opening that leans; volumes were seen from where the first two meet."""
+    corners, hole = (
+        np.array([[0, 0, 1], [4, 0, 1], [0, 4, 1.0]]),
+        np.array([[1, 1, 1], [2, 1, 1.5], [1, 2, 1.0]]),
+    )
+    faces = [[k, (k + 1) % 3, j] for k, j in ((0, 3), (1, 4), (2, 5))]
+    faces += [[(k + 1) % 3, 3 + (k + 1) % 3, 3 + k] for k in range(3)]
+    on = {
+        Plane((0, 0, 0), (0, 1, 0)): [0, 1],
+        Plane((4, 0, 0), (1, 1, 0)): [1, 2],
+        Plane((0, 0, 0), (1, 0, 0)): [2, 0],
+    }
+    X, roof = np.concatenate([corners, hole]), [Patch("roof", 1.0, 1.0)]
+    found = [
+        energy(Surface(X, faces, [0] * 6, roof, fixed=[3, 4, 5], on_planes=dict(order)))
+        for order in permutations(on.items())
+    ]
+    assert found == pytest.approx(found[:1] * 6)
 
 
 def test_where_pressures_do_not_cancel_the_point_of_the_plane_stays():

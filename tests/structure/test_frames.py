@@ -44,7 +44,7 @@ def test_a_straight_beam_has_the_moment_and_the_deflection_of_the_tables(axis, c
         X, forces = straight(n), np.zeros((n + 1, 3))
         forces[:, axis] = -3.0 * lumped(np.full(n, 10.0 / n))
         solved = frame_along(X, hinged(3)).solved(forces)
-        within = solved.within(np.arange(n))
+        within = solved.within(np.arange(n))[0]
         assert within[n // 2, column] == pytest.approx(3.0 * 100.0 / 8.0)
         shear = within[:, 1 if axis == 2 else 2]
         np.testing.assert_allclose(shear, 3.0 * (5.0 - X[:, 0]), atol=1e-9)  # dM/ds, also at the ends
@@ -128,10 +128,55 @@ def test_clamped_ends_take_a_twelfth():
     forces[:, 2] = -3.0 * lumped(np.full(n, 10.0 / n))
     ends = [(end, k) for end in (0, -1) for k in range(6)]
     solved = frame_along(straight(n), ends).solved(forces)
-    assert solved.within(np.arange(n))[[0, n // 2, -1], 4] == pytest.approx(
+    assert solved.within(np.arange(n))[0][[0, n // 2, -1], 4] == pytest.approx(
         [-3.0 * 100 / 12, 3.0 * 100 / 24, -3.0 * 100 / 12], rel=3e-3
     )
     assert solved.moments[0, 1] == pytest.approx(-3.0 * 100 / 12, rel=3e-3)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_a_portal_has_the_forces_of_both_sides_at_its_corners(turn):
+    """An even load w on the beam, clamped feet, k = E I' h / E I L: H = w L²/4 h (k + 2), M = 2 H h/3 at the
+    corners, N = -H in the beam and -w L/2 in the columns. A corner had the mean of both sides: N of neither,
+    and moments that nearly cancelled."""
+    n, h, L, up = 32, 4.0, 6.0, np.array([np.sin(turn), 0.0, np.cos(turn)])
+    rise, along = np.linspace(0.0, h, n + 1), np.linspace(0.0, L, n + 1)
+    x = np.concatenate([0.0 * rise, along[1:-1], 0.0 * rise + L])
+    z = np.concatenate([rise, 0.0 * along[1:-1] + h, rise[::-1]])
+    X = np.outer(x, np.cross([0.0, 1.0, 0.0], up)) + np.outer(z, up)
+    forces = np.zeros_like(X)
+    forces[n : 2 * n + 1] = -np.outer(3.0 * lumped(np.full(n, L / n)), up)
+    rows = np.zeros((12, 6 * len(X)))
+    rows[:6, :6] = rows[6:, -6:] = np.eye(6)
+    stiffness = np.repeat([[1e9, EI, EI, 9.0] for EI in (100.0, 250.0, 100.0)], n, axis=0)
+    bars = np.stack([np.arange(3 * n), np.arange(3 * n) + 1], axis=1)
+    within, at = BarFrame(X, bars, stiffness, rows, up).solved(forces).within(np.arange(3 * n))
+    H = 3.0 * L**2 / (4.0 * h * (2.5 * h / L + 2.0))
+    assert at[[n, n + 1]].tolist() == [n, n]
+    N, V, M = within[[n, n + 1], 0], *(np.linalg.norm(within[[n, n + 1], k : k + 2], axis=1) for k in (1, 4))
+    np.testing.assert_allclose(N, [-9.0, -H], rtol=2e-3)
+    np.testing.assert_allclose(V, [H, 9.0], rtol=2e-3)
+    np.testing.assert_allclose(M, 2.0 * H * h / 3.0, rtol=2e-3)
+
+
+@pytest.mark.parametrize("first", [0, 3])
+def test_a_square_ring_has_the_moments_of_its_sides_and_their_shear_at_its_corners(first):
+    """Pulled outwards with q: N = V = q a/2, M = -q a²/12 at corners, V the same on any mesh."""
+    side = np.arange(8) / 8.0
+    X = np.concatenate([np.stack([side, 0.0 * side], axis=1) - 0.5 for _ in range(4)])
+    for k in range(4):
+        turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+        X[8 * k : 8 * k + 8] = X[8 * k : 8 * k + 8] @ np.linalg.matrix_power(turn, k)
+    X = np.roll(np.pad(X, ((0, 0), (0, 1))), first, axis=0)
+    edges = np.roll(X, -1, axis=0) - X
+    pull = 0.5 * 6.0 * np.cross(edges + np.roll(edges, 1, axis=0), UP)
+    within, at = frame_along(X, closed=True).solved(pull).within(np.arange(32), closed=True)
+    corners = within[np.flatnonzero(np.diff(at) == 0) + 1]
+    assert len(corners) == (4 if first else 3)  # the first is the first and the last row
+    assert at[[0, -1]].tolist() == ([0, 31] if first else [0, 32])
+    np.testing.assert_allclose(within[:, 0], 3.0)
+    np.testing.assert_allclose(np.abs(corners[:, 2]), 3.0)
+    np.testing.assert_allclose(corners[:, 5], -6.0 / 12.0 * (1.0 - 1.0 / 64.0), rtol=1e-6)
 
 
 def arch(n, shape):
@@ -149,7 +194,7 @@ def test_a_parabolic_arch_under_an_even_load_does_not_bend():
     forces[:, 2] = -2.0 * lumped(np.diff(X[:, 0]))
     solved = frame_along(X, hinged(3), stiffness=(1e10, 100.0, 100.0, 100.0)).solved(forces)
     assert solved.reactions[0] == pytest.approx([2.0 * 100 / (8 * 4.0), 0.0, 10.0])
-    assert np.abs(solved.within(np.arange(20))[:, 4]).max() < 1e-5 * 2.0 * 100.0 / 8.0
+    assert np.abs(solved.within(np.arange(20))[0][:, 4]).max() < 1e-5 * 2.0 * 100.0 / 8.0
     N, share = balancing_force(X, forces, closed=False)
     middle = np.array([0, 0, 1.0]) @ (X[1] - X[0]) / np.linalg.norm(X[1] - X[0])
     assert share > 0.05
@@ -169,7 +214,7 @@ def test_a_two_hinged_half_circle_has_the_thrust_of_its_closed_form():
         forces[:, 2] = -2.0 * lumped(np.diff(X[:, 0]))
         solved, H = frame.solved(forces), 4.0 * 2.0 * 5.0 / (3.0 * np.pi)
         exact = 25.0 * np.sin(angle) ** 2 - 5.0 * H * np.sin(angle)
-        off.append(np.abs(solved.within(np.arange(n))[:, 4] - exact).max() / 25.0)
+        off.append(np.abs(solved.within(np.arange(n))[0][:, 4] - exact).max() / 25.0)
         point = np.zeros_like(X)
         point[n // 2, 2] = -7.0
     assert solved.reactions[0] == pytest.approx([H, 0.0, 10.0], rel=2e-3, abs=1e-9)
@@ -186,7 +231,7 @@ def test_a_curved_cantilever_has_the_moments_and_shear_of_its_closed_form_with_o
         angle[1:-1:2] += 0.25 * (angle[1] - angle[0])
         X = 4.0 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
         forces = -3.0 * lumped(4.0 * np.diff(angle))[:, None] * UP
-        within = frame_along(X, [(0, k) for k in range(6)]).solved(forces).within(np.arange(n))
+        within = frame_along(X, [(0, k) for k in range(6)]).solved(forces).within(np.arange(n))[0]
         b = np.pi / 2.0 - angle
         exact = np.stack([12.0 * b, -48.0 * (b - np.sin(b)), -48.0 * (1.0 - np.cos(b))], axis=1)
         off.append(np.abs(within[:, [1, 3, 4]] - exact).max(axis=0) / np.abs(exact).max(axis=0))
@@ -201,13 +246,19 @@ def test_a_ring_that_nothing_holds_carries_its_pull_without_bending():
         angle = 2.0 * np.pi * np.arange(n) / n
         X = 2.0 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
         pull = 3.0 * X / 2.0 * (2.0 * np.pi * 2.0 / n)
-        within = frame_along(X, closed=True).solved(pull + 0.1 * UP).within(np.arange(n), closed=True)
+        within = frame_along(X, closed=True).solved(pull + 0.1 * UP).within(np.arange(n), closed=True)[0]
         np.testing.assert_allclose(within[:, 4:], 0.0, atol=1e-6)
         N, share = balancing_force(X, pull, closed=True)
         assert share < 1e-12
         assert pytest.approx(N) == within[0, 0]
         off.append(within[0, 0] / 6.0 - 1.0)
     assert np.polyfit(np.log([16, 32, 64]), np.log(off), 1)[0] == pytest.approx(-2.0, abs=0.02)
+
+
+def test_a_straight_line_has_no_force_of_its_own_wherever_it_lies():
+    """Turned, it had a force over the rounding of its turns, whose wall would pull as much as the sheets."""
+    X = np.outer(np.linspace(0.0, 1.0, 9), [0.3, 0.5, 0.7]) + 1e3
+    assert balancing_force(X, np.ones((9, 3)), closed=False) == (0.0, 1.0)
 
 
 def test_a_bar_that_stands_has_axes_too():

@@ -8,7 +8,7 @@ from convergence import orders
 from nightly import at_night
 from refusals import refused
 from scipy.spatial import cKDTree
-from shapes import pyramid
+from shapes import pyramid, tube
 
 from generators import (
     catenoid,
@@ -19,7 +19,7 @@ from generators import (
     enneper_wire,
     two_squares,
 )
-from pcmc import BoundaryMotion, certify, follow, solve
+from pcmc import BoundaryMotion, Patch, Plane, certify, follow, solve
 from pcmc.base.errors import OptionError
 from pcmc.solvers.continuation import Branch, Ending
 from pcmc.solvers.continuation.state import BranchMesh, BranchState
@@ -58,6 +58,17 @@ def test_catenoids_fold_at_the_widest_distance_with_second_order(catenoids):
         assert change.parameter == pytest.approx(branch.folds.parameter[0], rel=1e-3)
         assert change.along_branch > 0.9
         assert branch.bifurcations.empty
+
+
+def test_half_a_film_at_a_mirror_folds_where_the_whole_does():
+    """Its triangles follow the ring as those of the whole; once a row at the mirror took all the stretch."""
+    patch, half = Patch("film", 1.0, 0.0), 0.5
+    mirror = {"fixed": range(72, 84), "on_planes": {Plane(mirror=True): range(12)}}
+    film = tube(6, 12, lambda t: (0.85 + 0.15 * t**2, half * t), patch, **mirror)
+    whole = tube(12, 12, lambda t: (0.85 + 0.15 * (2.0 * t - 1.0) ** 2, half * (2.0 * t - 1.0)), patch)
+    starts = [solve(one).surface for one in (film, whole)]
+    folds = [follow(s, BoundaryMotion(rings(s), half), folds=1).folds.parameter[0] for s in starts]
+    assert folds[0] == pytest.approx(folds[1], rel=1e-4)
 
 
 def test_every_point_is_the_catenoid_between_its_rings(catenoids):
