@@ -130,13 +130,21 @@ class CuttingOptions:
         return lines
 
     def check(self, surface: Surface) -> None:
-        """Refuse names of patches that the roof does not have, before it is solved; warn of a direction that
-        is another one behind a mirror plane."""
+        """Refuse names of patches that the roof does not have, and a cloth that none is, before it is solved;
+        warn of a direction that is another one behind a mirror plane."""
         names = [patch.name for patch in surface.patches]
         for key in BY_PATCH:
             given = getattr(self, key)
             for name in given if isinstance(given, Mapping) else ():
                 validate.choice(f"patch in {key}", name, names)
+        for name in names:
+            (warp, weft), poisson = (
+                self.of_patch("stiffness", name) or (1.0, 0.0),
+                self.of_patch("poisson", name),
+            )
+            if poisson**2 * weft >= warp:  # as of a Material
+                text = f"stiffness of {name!r}: the weft has to be less than warp/poisson²"
+                raise OptionError(f"{text} = {warp / poisson**2:.4g}, found {weft:g}", what="stiffness")
         mirrors = [plane for plane, _ in surface.on_planes if plane.mirror]
         for name, mirror in product(np.array(names)[surface.roof].tolist(), mirrors):
             if (degrees := self.of_patch("direction", name)) is None:

@@ -20,6 +20,7 @@ from ..surface.values import in_the_open
 
 GRAVITY = 9.81  # m/s²
 FORM = "form"  # what combinations call the form-finding load
+FORM_STEPS = ("form pressure", "form pressure less snow")  # its step without snow, and with
 EVEN = 1e-6  # of the size, squared: a patch with less area in the plan faces to neither side
 STEEPEST = 180.0  # degrees: a face that looks down
 
@@ -163,7 +164,7 @@ def load_steps(
     ends, _, per_length = surface.cable_edges
     per_edge = 1.5 * per_length * segment_lengths(surface.vertices, ends)
     np.add.at(weight, ends, per_edge[:, None, None] * downwards)
-    name = "form pressure less snow" if surface.snows.any() else "form pressure"
+    name = FORM_STEPS[int(surface.snows.any())]
     form = permanent = Step(name, surface.net_pressures[surface.patch_of_face], weight)
     steps, added = [form], {FORM: (form, nothing(form))}
     for together in map(acting_together, loads):
@@ -229,14 +230,15 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
     cases = [FORM, *(step_name(acting_together(entry)) for entry in loads)]
     if not isinstance(given, Mapping):
         validate.refuse("combinations", given, "factors by name, such as {'uls': {'snow': 1.5}}")
-    if len(set(cases)) < len(cases):
-        name = next(name for name in cases if cases.count(name) > 1)
+    taken = [*FORM_STEPS, *cases]
+    if len(set(taken)) < len(taken):
+        name = next(name for name in taken if taken.count(name) > 1)
         text = f"loads: two cases are called {name!r}; give each a name of its own"
         raise OptionError(text, what="loads", found=name)
     checked: dict[str, dict[str, float]] = {}
     for name, factors in given.items():
         validate.checked_name("name of a combination", name)
-        if name in cases:
+        if name in taken:
             text = f"combination {name!r}: a case has this name; give the combination another one"
             raise OptionError(text, what="combinations", found=name)
         if not isinstance(factors, Mapping) or not factors:

@@ -165,6 +165,10 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[PlacedMember,
     """
     lines, taken = list[PlacedMember](), np.zeros(len(surface.topology.edges), dtype=bool)
     cut, own = _mirrored(surface), [cable.name for cable in surface.cables]
+    on_cables = [str(one.on) for one in members if one.on in own]
+    for name in (name for name in own if on_cables.count(name) > 1):
+        text = f"members: {name!r} has several; leave out all but one of them"
+        raise OptionError(text, what="members", where=name)
     for member in (one for one in members if not (one.two_points or one.on in own)):
         for line in _lines_of(surface, member):
             edges = surface.topology.edge_numbers(line.pairs)

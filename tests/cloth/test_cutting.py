@@ -366,6 +366,10 @@ def test_a_cable_is_a_seam():
         ({"strips": 2, "compensation": (1.0, 50.0)}, "compensation: expected"),
         ({"strips": 2, "compensation": (1.0, 1.0), "stiffness": (1.0, 1.0)}, "leave out one of both"),
         ({"strips": 2, "compensation": (1.0, 1.0), "poisson": 0.2}, "poisson: it counts with the stiffness"),
+        (
+            {"strips": 2, "stiffness": (50.0, 200.0), "poisson": 0.5},
+            r"less than warp/poisson² = 200, found 200",
+        ),
         ({"strips": {"dome": 2}}, "dome"),
     ],
 )

@@ -79,7 +79,8 @@ def test_a_beam_whose_end_slides_along_it_bends_as_one_with_both_ends_held(ends)
     assert rolls.within[:, 1:] == pytest.approx(held.within[:, 1:], abs=1e-9)
     assert rolls.displacements[:, 1:] == pytest.approx(held.displacements[:, 1:], abs=1e-12)
     expect_ccx()
-    assert analyse(models[1], remedy=False).members["M"][0] == pytest.approx(rolls.largest["M"], rel=0.02)
+    moments = [analyse(model, remedy=False).members["M"][0] for model in models]
+    assert moments[1] == pytest.approx(moments[0], rel=1e-3)
 
 
 @pytest.mark.parametrize("program", [False, pytest.param(True, marks=needs_ccx)])

@@ -19,6 +19,7 @@ from pcmc.report.chapters import under_load_chapter
 from pcmc.report.tables import Picture, Table
 from pcmc.structure import Member, Profile, analyse
 from pcmc.structure.member_forces import (
+    cable_notes,
     members_at_rest,
     sentences,
     weak_members,
@@ -87,6 +88,18 @@ def test_the_diagram_of_a_ring_comes_back_to_where_it_begins(monkeypatch):
         assert force[0] == force[-1]
 
 
+def test_a_beam_on_a_cable_is_told_to_be_a_rope():
+    """A cable does not bend; without a word the beam had its area alone."""
+    beam, rope = (
+        model_of(square(cable=3.0), members=[Member("tie", TUBE, STEEL, kind)], anyway=True)
+        for kind in ("beam", "cable")
+    )
+    assert cable_notes(rope) == []
+    assert cable_notes(beam) == [
+        'the members on the cables "tie" count as their sections: cables do not bend'
+    ]
+
+
 def test_a_member_that_cannot_be_is_refused_in_a_line():
     def lines(surface, member):
         return model_of(surface, members=[member], anyway=True).lines
@@ -114,6 +127,8 @@ def test_a_member_that_cannot_be_is_refused_in_a_line():
         StructuralModel(hall(), FABRIC, 1e-3, members=[Member("wall 1", TUBE, STEEL)] * 2)
     with refused(OptionError, what="members"):
         StructuralModel(hall(), FABRIC, 1e-3, members=["wall 1"])
+    with refused(OptionError, what="members", where="tie"):  # the last one counted
+        model_of(square(cable=3.0), members=[Member("tie", TUBE, STEEL, "cable")] * 2, anyway=True)
     crossing = [[[4, 0], [4, 4]], [[0, 2], [8, 2]]]
     bays = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], crossing, edge_length=0.8, tension=2.0).surface()
     with refused(OptionError, what="members", where="wall 1"):
