@@ -122,6 +122,15 @@ def test_lengths_twice_and_tensions_twice_give_the_branch_twice_as_large(small_c
     assert two.folds.parameter[0] == pytest.approx(2.0 * one.folds.parameter[0], rel=1e-9)
 
 
+def test_a_load_that_is_0_at_the_start_has_steps_of_one_length_in_all_units(small_cap):
+    """In newtons instead of kilonewtons a step was a thousand times as short."""
+    newtons = small_cap.retensioned({"cap": 600.0}, {"cap": 1000.0})
+    loads = Direction(weights={"cap": 1.0})
+    one, two = (follow(s, loads, 0.5 * p).points for s, p in ((small_cap, 1.0), (newtons, 1e3)))
+    assert two.parameter.to_numpy() == pytest.approx(1e3 * one.parameter, rel=1e-9)
+    assert two.height.to_numpy() == pytest.approx(one.height, rel=1e-8)
+
+
 def test_same_branch_twice_gives_the_same_tables(small_cap):
     one, two = (follow(small_cap, "cap", step=-0.05, folds=1) for _ in range(2))
     same(one.points, two.points)
