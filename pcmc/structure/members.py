@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -179,6 +179,8 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[PlacedMember,
                 raise OptionError(f"member {line.name!r} {problem}", what="members", where=line.name)
             taken[edges] = True
             lines.append(line)
+    labels = [line.name for line in lines]
+    lines = [replace(line, name=_numbered(labels, k)) for k, line in enumerate(lines)]
     # a wall that ends at one with a member: nothing would hold its edge there
     replaced = {line.wall for line in lines}
     gone = np.array([patch.name in replaced for patch in surface.patches])
@@ -216,10 +218,9 @@ def bars_on(
         if line.member.kind == "beam":
             alone[[v for v, _ in line.ends if surface.fixed[v]]] = True
     points, near = np.flatnonzero(alone), BESIDE * float(np.median(segment_lengths(X, topo.edges)))
-    labels = [member.label for member in given]
-    for k, member in enumerate(given, 1):
-        name = member.label
-        name += f"-{labels[:k].count(name)}" if labels.count(name) > 1 else ""
+    labels = [line.member.label for line in lines] + [member.label for member in given]
+    for k, member in enumerate(given, len(lines)):
+        name = _numbered(labels, k)
         top, foot = (to_space(np.array([*p, 0.0]), plane) if len(p) == 2 else p for p in member.two_points)
         away = plane.to_local(X[points]) - plane.to_local(np.array([top]))
         here, at, problem = points[np.hypot(*away[:, :2].T) <= near], point_text(np.array(top)), ""
@@ -243,6 +244,12 @@ def bars_on(
             text += " or of two, not in one line; leave one out"
             raise OptionError(text, what="members", where=own[0].name)
     return tuple(bars)
+
+
+def _numbered(labels: Sequence[str], k: int) -> str:
+    """The label k, with a number where others are the same."""
+    same = labels.count(labels[k]) > 1
+    return f"{labels[k]}-{labels[: k + 1].count(labels[k])}" if same else labels[k]
 
 
 def at_points(bars: Iterable[PlacedMember]) -> dict[int, list[PlacedMember]]:
@@ -279,9 +286,8 @@ def _lines_of(surface: Surface, member: Member) -> Iterator[PlacedMember]:
             raise OptionError(text, what="members", found=member.on)
         found = [(name, _top(surface, k)) for name, k in walls]
     curves = [(wall, curve) for wall, edges in found for curve in surface.topology.curves_among(edges)]
-    for number, (wall, curve) in enumerate(curves, 1):
-        name = member.label if len(curves) == 1 else f"{member.label}-{number}"
-        about = name, member.kind, member, surface.vertices[curve.vertices], wall
+    for wall, curve in curves:
+        about = member.label, member.kind, member, surface.vertices[curve.vertices], wall
         yield PlacedMember(curve.vertices, curve.closed, curve.sheets, *about)
 
 

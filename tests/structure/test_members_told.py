@@ -67,6 +67,17 @@ def test_equal_beams_share_a_line():
     assert told[0].startswith("edge 0, edge 1: at rest N = ")
 
 
+def test_beams_and_columns_of_one_name_have_numbers():
+    """Tables had several under one name, and a file the force of the last one on all of them."""
+    film, steel = square(8, tension=2.0), (TUBE, STEEL)
+    ends = [
+        Member(polyline(line), *steel, name="edge") for line in ([[0, 0], [1, 0]], [[0, 0.25], [0, 0.75]])
+    ]
+    column = Member([[0, 0], [0, 0, -1]], *steel, name="edge")
+    model = model_of(film, members=[*ends, column], anyway=True)
+    assert [line.name for line in (*model.lines, *model.bars)] == ["edge-1", "edge-2", "edge-3"]
+
+
 @pytest.mark.parametrize("profile", [TUBE, Profile(5.38e-3, 8.36e-5, 6.04e-6)], ids=["tube", "I"])
 def test_the_torsion_constant_of_a_section_without_a_shape_is_told(profile):
     """4 I I'/(I + I') = 2.25e-5 m⁴; that of an IPE 300 is 2.0e-7: a bow twists a hundred times as much."""
