@@ -49,7 +49,7 @@ class Varied:
         if not more:
             raise OptionError(f"the {what} is 0, and cannot become less", what="towards", found=0.0)
         cables = [c for c in surface.cables if ("cable_weight", c.name) in parts]
-        halves = [surface.mirror_edge[surface.topology.edge_numbers(c.edges)].all() for c in cables]
+        halves = [bool(surface.mirror_edge[surface.topology.edge_numbers(c.edges)].all()) for c in cables]
         if any(halves) and not all(halves):
             name = cables[halves.index(True)].name
             text = f"the {what} is 0, and of {name!r}, in a mirror plane, only a half is there; give weights,"

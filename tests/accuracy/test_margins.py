@@ -267,7 +267,7 @@ def test_weights_of_a_whole_and_a_halved_cable_do_not_grow_alike():
     )
     with pytest.raises(OptionError, match="of 'spine', in a mirror plane, only a half is there"):
         Varied.of(sail, "cable_weight")
-    assert Varied.of(sail, "cable_weight of spine").unit == Varied.of(sail, "cable_weight of edge").unit
+    assert Varied.of(sail, "weight of cable spine").unit == Varied.of(sail, "weight of cable edge").unit
 
 
 def test_what_is_not_at_rest_has_none():
