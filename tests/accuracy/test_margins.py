@@ -54,6 +54,14 @@ def test_a_coarse_end_that_does_not_settle_yet_has_no_bar(monkeypatch):
     assert "± unknown" in found.text()
 
 
+def test_an_end_without_a_bar_that_no_smooth_surface_reaches_is_named():
+    found = margin(cap(), "pressure", meshes=1)
+    assert found.ends_by is MarginEnd.FOLD
+    assert (
+        "only a mesh as coarse as this is at rest here, no smooth surface is: the pressure is" in found.detail
+    )
+
+
 def test_curves_that_are_guessed_are_in_the_bar(monkeypatch):
     """An octagon beside other turns may be a curve; the end differs there by 0.1 on the next mesh."""
     angle = np.arange(8) * np.pi / 4.0
