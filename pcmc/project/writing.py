@@ -41,7 +41,7 @@ WRITERS = (  # libraries that some formats need, whatever is in the file, with t
     ("ezdxf", "cad", (".dxf",)),
     ("pyarrow", "files", (".parquet",)),
 )
-FileJob = tuple[Path, Callable[[Path], Any]]  # a file with the function that writes it
+FileJob = tuple[Path, Callable[..., Any]]  # a file with the function that writes it
 FileJobs = list[FileJob]
 
 
