@@ -182,8 +182,13 @@ def test_at_given_volumes_the_large_cap_is_stable_and_the_energy_is_that_of_the_
 
 def test_a_picture_has_the_equilibria_on_their_branches(monkeypatch):
     """Where a room prescribes a volume both have the energy at it; once the branch was lower by p V."""
-    drawn = dict[str, Branch]()
-    monkeypatch.setattr(uses, "add_branches", lambda axes, branches, x, y: len(drawn.update(branches) or ()))
+    drawn, add = dict[str, Branch](), uses.add_branches
+
+    def add_and_keep(axes, branches, x, y):
+        drawn.update(branches)
+        return add(axes, branches, x, y)
+
+    monkeypatch.setattr(uses, "add_branches", add_and_keep)
     cap = spherical_cap(0.5).rebuilt(rooms=[Room("inside", {"cap": 1}, 1.0)])
     found = find_equilibria(cap, "volume", starts=0, span=(0.9, 1.1))
     plot.equilibria(found, y="energy", width=200)
