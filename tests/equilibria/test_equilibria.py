@@ -191,7 +191,7 @@ def test_a_picture_has_the_equilibria_on_their_branches(monkeypatch):
     monkeypatch.setattr(uses, "add_branches", add_and_keep)
     cap = spherical_cap(0.5).rebuilt(rooms=[Room("inside", {"cap": 1}, 1.0)])
     found = find_equilibria(cap, "volume", starts=0, span=(0.9, 1.1))
-    plot.equilibria(found, y="energy", width=200)
+    plot.equilibria(found, y="energy", width=600)
     points = drawn["branch 1"].points
     assert points.energy[(points.parameter - 1.0).abs().idxmin()] == pytest.approx(found[1].energy, rel=1e-9)
 
