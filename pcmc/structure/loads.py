@@ -258,9 +258,11 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
 
 def plan_areas(surface: Surface) -> Floats:
     """(m,) the area of each face in the plan, below 0 if it overhangs, length². The side of a patch that
-    looks away from Π is the one of the larger part of its plan."""
-    plan: Floats = area_vectors(surface.vertices[surface.faces]) @ np.array(surface.plane.normal)
-    return plan * np.sign(np.bincount(surface.patch_of_face, plan))[surface.patch_of_face]
+    looks away from Π is the one of the larger part of its plan, or of an upright patch of its higher part."""
+    P, patch = surface.vertices[surface.faces], surface.patch_of_face
+    plan: Floats = area_vectors(P) @ np.array(surface.plane.normal)
+    sides, higher = (np.bincount(patch, plan * by) for by in (1.0, surface.plane.height(P).mean(axis=1)))
+    return plan * np.sign(np.where(np.abs(sides) > EVEN * surface.size**2, sides, higher))[patch]
 
 
 def roof_slopes(surface: Surface) -> Floats:
