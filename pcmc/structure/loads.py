@@ -213,19 +213,22 @@ def check_loads(
     expected = "a sequence of SelfWeight, Snow or Wind, or of tuples of these"
     if isinstance(loads, Load) or not isinstance(loads, Sequence):
         validate.refuse("loads", loads, expected)
+    every = [load for entry in loads for load in acting_together(entry)]
+    if len({load.gravity for load in every if isinstance(load, SelfWeight)}) > 1:
+        text = "loads: self-weights of several gravities, of which one replaces the other; give them one"
+        raise OptionError(text, what="loads")
     leaning = leaning_mirrors(surface.plane, surface.on_planes)
-    for entry in loads:
-        for load in acting_together(entry):
-            if not isinstance(load, Load):
-                validate.refuse("loads", load, expected)
-            if leaning and not isinstance(load, Wind):
-                text = f"{load.name}: the {leaning[0]} leans over Π, and behind it down is elsewhere"
-                raise OptionError(f"{text}; take the whole roof, pcmc.mirrored(surface)", what="loads")
-            for name in getattr(load, "patches", ()):
-                surface.patch_index(name)
-                if name in replaced:
-                    text = f"{load.name}: a member stands in the place of {name!r}, so no load acts on it"
-                    raise OptionError(f"{text}; leave it out", what="loads", where=name)
+    for load in every:
+        if not isinstance(load, Load):
+            validate.refuse("loads", load, expected)
+        if leaning and not isinstance(load, Wind):
+            text = f"{load.name}: the {leaning[0]} leans over Π, and behind it down is elsewhere"
+            raise OptionError(f"{text}; take the whole roof, pcmc.mirrored(surface)", what="loads")
+        for name in getattr(load, "patches", ()):
+            surface.patch_index(name)
+            if name in replaced:
+                text = f"{load.name}: a member stands in the place of {name!r}, so no load acts on it"
+                raise OptionError(f"{text}; leave it out", what="loads", where=name)
     return tuple(loads)
 
 
@@ -258,9 +261,11 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
 
 def plan_areas(surface: Surface) -> Floats:
     """(m,) the area of each face in the plan, below 0 if it overhangs, length². The side of a patch that
-    looks away from Π is the one of the larger part of its plan."""
-    plan: Floats = area_vectors(surface.vertices[surface.faces]) @ np.array(surface.plane.normal)
-    return plan * np.sign(np.bincount(surface.patch_of_face, plan))[surface.patch_of_face]
+    looks away from Π is the one of the larger part of its plan, or of an upright patch of its higher part."""
+    P, patch = surface.vertices[surface.faces], surface.patch_of_face
+    plan: Floats = area_vectors(P) @ np.array(surface.plane.normal)
+    sides, higher = (np.bincount(patch, plan * by) for by in (1.0, surface.plane.height(P).mean(axis=1)))
+    return plan * np.sign(np.where(np.abs(sides) > EVEN * surface.size**2, sides, higher))[patch]
 
 
 def roof_slopes(surface: Surface) -> Floats:

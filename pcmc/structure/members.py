@@ -21,7 +21,7 @@ from ..surface.curves import Curve
 from ..surface.geometry import lengths_along, segment_lengths, unit_vectors
 from ..surface.pieces import point_text, to_space
 from ..surface.topology import EdgeCurve
-from .frames import bar_axes
+from .frames import UPRIGHT, bar_axes
 from .material import Material, Profile
 
 DRAW, WHOLE = "draw the whole plan, without mirrors", "take the whole roof, whole = true"
@@ -29,6 +29,7 @@ KINDS = ("beam", "cable")
 ENDS = ("hinged", "clamped")
 BESIDE = 0.02  # of the length of edges: so near to a curve their ends are on it
 SHORTEST = 1e-6  # of the size: a shorter bar is none
+ALIKE = 1e-6  # of a second moment of area: nearer ones are the same
 FLAT = 0.02  # least singular value of the directions of bars: nearer to one plane their forces are no answer
 
 
@@ -154,7 +155,8 @@ class PlacedMember(EdgeCurve):
 
 def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[PlacedMember, ...]:
     """The lines of members on a surface, but for those of its own cables; OptionError for a member that is on
-    no edge, on a wall that rests on Π, or where another one is, and a wall that ends at one with a member.
+    no edge, on a wall that rests on Π, where another one is, or upright with a section that is not alike in
+    both directions, and for a wall that ends at one with a member.
 
     >>> from pcmc.plan import Plan
     >>> hall = Plan([[0, 0], [4, 0], [4, 2], [0, 2]], [[[2, 0], [2, 2]]], edge_length=0.5, tension=2.0)
@@ -173,6 +175,10 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[PlacedMember,
         for line in _lines_of(surface, member):
             edges = surface.topology.edge_numbers(line.pairs)
             problem = "runs where another one does; leave one of them out" if taken[edges].any() else ""
+            (high, wide), t = member.profile.moments, unit_vectors(np.diff(line.path, axis=0))
+            stands = np.linalg.norm(np.cross(surface.plane.normal, t), axis=1) <= UPRIGHT
+            if line.kind == "beam" and stands.any() and abs(high - wide) > ALIKE * high:
+                problem = "stands upright, where a section has no height; give it one that is alike all round"
             if cut[line.vertices].any():
                 problem = f"meets a mirror plane; {WHOLE if line.wall else DRAW}"
             if problem:

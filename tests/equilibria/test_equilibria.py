@@ -26,6 +26,8 @@ from pcmc.equilibria import search, shape_distance
 from pcmc.equilibria.found import Equilibria, WayDown
 from pcmc.explore.page_data import equilibria_data
 from pcmc.forces.functional import patch_areas
+from pcmc.plot import uses
+from pcmc.solvers.continuation import Branch
 
 SMALL, LARGE = spherical_cap_exact(), spherical_cap_exact(upper=True)
 
@@ -176,6 +178,22 @@ def test_at_given_volumes_the_large_cap_is_stable_and_the_energy_is_that_of_the_
     assert [one.index for one in found.found] == [0]
     film = float(patch_areas(found[1].surface) @ [patch.tension for patch in closed.patches])
     assert found[1].energy == pytest.approx(film, rel=1e-10)
+
+
+def test_a_picture_has_the_equilibria_on_their_branches(monkeypatch):
+    """Where a room prescribes a volume both have the energy at it; once the branch was lower by p V."""
+    drawn, add = dict[str, Branch](), uses.add_branches
+
+    def add_and_keep(axes, branches, x, y):
+        drawn.update(branches)
+        return add(axes, branches, x, y)
+
+    monkeypatch.setattr(uses, "add_branches", add_and_keep)
+    cap = spherical_cap(0.5).rebuilt(rooms=[Room("inside", {"cap": 1}, 1.0)])
+    found = find_equilibria(cap, "volume", starts=0, span=(0.9, 1.1))
+    plot.equilibria(found, y="energy", width=600)
+    points = drawn["branch 1"].points
+    assert points.energy[(points.parameter - 1.0).abs().idxmin()] == pytest.approx(found[1].energy, rel=1e-9)
 
 
 # ---- shapes -------------------------------------------------------------------------------------

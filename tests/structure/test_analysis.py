@@ -217,6 +217,17 @@ def test_a_sheet_on_the_slope_between_two_zones_is_in_one(degrees):
 
 
 @pytest.mark.parametrize("side", [1, -1])
+def test_snow_lies_on_the_upper_half_of_a_gable_that_bulges(side):
+    """Both halves have one plan: by the rounding of their sum it hung below the lower one."""
+    film = square(6)
+    x, y, _ = film.vertices.T
+    bulging = film.moved(np.stack([x, -0.2 * np.sin(np.pi * x) * np.sin(np.pi * y), y], axis=1))
+    snow = load_steps(bulging.rebuilt(faces=film.faces[:, ::side]), [Snow(1.0)])[1].forces[:, 2]
+    assert snow.sum() == pytest.approx(-0.124, abs=1e-3)
+    assert snow @ y / snow.sum() > 0.8
+
+
+@pytest.mark.parametrize("side", [1, -1])
 def test_wind_on_a_roof_whose_triangles_face_down_is_told(side):
     """Suction above 0 pushed it down, without a word."""
     film = square(4).rebuilt(faces=square(4).faces[:, ::side])

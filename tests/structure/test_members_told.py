@@ -67,6 +67,20 @@ def test_equal_beams_share_a_line():
     assert told[0].startswith("edge 0, edge 1: at rest N = ")
 
 
+@pytest.mark.parametrize("sizes", [(0.2, 0.2), (0.1, 0.2)])
+def test_a_beam_that_stands_needs_a_section_alike_all_round(sizes):
+    """The height of another one lay along an axis of space: it did not turn with the roof."""
+    flat = square(4, tension=2.0)
+    film = flat.moved(flat.vertices @ [[1.0, 0, 0], [0, 0, 1.0], [0, 0, 0]])
+    edge = Member(polyline([[0, 0, 0], [0, 0, 1]]), Profile.rectangle(*sizes), STEEL, name="edge")
+    if sizes[0] == sizes[1]:
+        assert len(model_of(film, members=[edge], anyway=True).lines) == 1
+        return
+    with refused(OptionError, what="members", where="edge") as caught:
+        model_of(film, members=[edge], anyway=True)
+    assert "stands upright" in str(caught.value)
+
+
 def test_beams_and_columns_of_one_name_have_numbers():
     """Tables had several under one name, and a file the force of the last one on all of them."""
     film, steel = square(8, tension=2.0), (TUBE, STEEL)

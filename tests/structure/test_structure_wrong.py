@@ -29,6 +29,7 @@ from pcmc.project import Structure
         ({"loads": Snow(1.0)}, "loads"),
         ({"loads": [1.0]}, "loads"),
         ({"loads": [()]}, "loads"),
+        ({"loads": [SelfWeight(), SelfWeight(5.0, "moon")]}, "loads"),
         ({"material": Material(1.0), "loads": [SelfWeight()]}, "Material.density"),
         ({"cable_material": 1}, "cable_material"),
     ],
