@@ -381,8 +381,8 @@ def equilibria_(
             else:
                 warn_of_members(roof, path.name)
                 for k, one in enumerate(found.found, 1):
-                    what = one.surface, one.certificate, [_numbered(path, k)], roof.units
-                    jobs += certified_files(*what, besides=place)
+                    named = [_numbered(path, k)]
+                    jobs += certified_files(one.surface, one.certificate, named, roof.units, "", place)
         written = write_all(jobs, progress)
     print(found.text(roof.units))
     return reports.ended(True, written)
