@@ -17,6 +17,7 @@ from .code import code_of
 from .folder import Folder, write_json
 
 STEPS = ("data", "table", "figure")
+SOURCES = (":/*.py", ":/*.toml")  # of the whole checkout
 LIBRARIES = ("pcmc-surfaces", "numpy", "scipy", "numba", "pandas", "nlopt")
 
 
@@ -92,7 +93,7 @@ def provenance(study: Study, folder: Folder, short: bool, seconds: Mapping[str, 
     return {
         "study": study.name,
         "commit": git("rev-parse", "HEAD"),
-        "uncommitted_changes": bool(git("status", "--porcelain", "--", "*.py", "*.toml")),
+        "uncommitted_changes": bool(git("status", "--porcelain", "--", *SOURCES)),
         "code": None if short else code_of(study.data.__module__),
         "short": short,
         "parameters": dict(study.parameters),

@@ -291,8 +291,6 @@ def margin(
     find = partial(find_end, varied=varied, index=index, most=most, callback=callback)
     end, unit, notes = find(surface), varied.unit or 1.0, list[str]()
     ends, order, curves = [end], USUAL, 0.0
-    if end.ends_by is MarginEnd.MESH:
-        notes = [only_coarse(end.surface, standing_part(end.surface).walls.pinchable)]
     if meshes > 1 and end.ends_by is not MarginEnd.NONE:
         try:
             check = check_mesh(surface, meshes, corners=corners, callback=callback)
@@ -309,6 +307,8 @@ def margin(
     numbers = np.array([[unit * one.factor] for one in ends])
     seen = numbers if {one.ends_by in OPEN for one in ends} == {False} else numbers[:1]
     bars = extrapolate(seen, EVENT_ACCURACY * abs(numbers[0]), shape_order=order, doubt=unit * curves)
+    if not math.isfinite(bars.error[0]):
+        notes.insert(0, only_coarse(end.surface, standing_part(end.surface).walls.pinchable))
     mode, dimensions = _mode(end, index), {dimension_of(kind) for kind, _ in varied.parts}
     if end.contacts:
         at = ", ".join(f"{unit * factor:.4g}" for factor in end.contacts)

@@ -13,6 +13,7 @@ from ..base.arrays import Floats
 from ..base.errors import OptionError
 from ..certificate.quantities import Parameter
 from ..solvers.continuation import Direction
+from ..solvers.continuation.parameters import usual_size
 from ..surface import Surface
 from ..surface.values import in_the_open
 
@@ -47,10 +48,13 @@ class Varied:
             return cls(what, varied, values[values != 0.0], more)
         if not more:
             raise OptionError(f"the {what} is 0, and cannot become less", what="towards", found=0.0)
-        usual = float(np.abs(surface.pressures).max()) or float(surface.tensions.max()) / surface.size
-        if parts[0][0] == "cable_weight":  # per length
-            usual *= surface.size
-        return cls(what, parts, values, more, usual)
+        cables = [c for c in surface.cables if ("cable_weight", c.name) in parts]
+        halves = [bool(surface.mirror_edge[surface.topology.edge_numbers(c.edges)].all()) for c in cables]
+        if any(halves) and not all(halves):
+            name = cables[halves.index(True)].name
+            text = f"the {what} is 0, and of {name!r}, in a mirror plane, only a half is there; give weights,"
+            raise OptionError(f"{text} or name one cable", what="what", where=name, found=0.0)
+        return cls(what, parts, values, more, usual_size(surface, f"{parts[0][0]}s"))
 
     @property
     def direction(self) -> Direction:

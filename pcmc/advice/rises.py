@@ -112,7 +112,7 @@ def with_rises(plan: Plan, rises: Sequence[Rise]) -> tuple[Plan, list[Target], l
             text = f"{rise.kind}{of} is {height:g} over the plane, and the outline is at {lowest:g} and more"
             raise OptionError(f"{text}; give a greater one", what=rise.kind, where=rise.patch, found=height)
         names: str | list[str] = rise.patch or [n for n in patch_names(plan) if loads.get(n, loads.get(""))]
-        if not names:
+        if not names or max(loads.values()) < 0.0:
             text = f"{rise.kind} is for a roof that a pressure lifts, and none is left here; give"
             text += f" pressure = ..., or tension = ... instead of {rise.kind}"
             raise OptionError(text, what=rise.kind)

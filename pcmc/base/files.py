@@ -110,7 +110,7 @@ def atomic_writes(paths: Iterable[PathLike]) -> Iterator[list[Path]]:
     """
     wanted = [Path(path) for path in paths]
     written, backups = (
-        [path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}") for path in wanted]
+        [path.with_name(f".{secrets.token_hex(8)}{path.suffix}") for path in wanted]  # as long as any name
         for _ in range(2)
     )
     done = 0

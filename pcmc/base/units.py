@@ -200,10 +200,10 @@ def unit_in_file(system: int | str) -> tuple[str, str]:
     return next(((name, "") for name, unit in TABLE.items() if system in (unit.dxf, unit.rhino)), ("", note))
 
 
-def unlikely_size(size: float, unit: str, drawn: str = "") -> str:
-    """A sentence on a plan whose size is unlikely in its unit, with the line to type; else empty.
+def unlikely_size(size: float, unit: str, drawn: str = "", what: str = "plan") -> str:
+    """A sentence on a plan or a mesh whose size is unlikely in its unit, with the line to type; else empty.
 
-    ``size`` is the larger side of the plan in ``unit``, ``drawn`` the unit that its drawing itself has.
+    ``size`` is its longest side in ``unit``, ``drawn`` the unit that its drawing itself has.
 
     >>> unlikely_size(12000.0, "m"), unlikely_size(12.0, "m")
     ('the plan is 12 km long; are its numbers in mm? Then type units = "mm"', '')
@@ -213,10 +213,13 @@ def unlikely_size(size: float, unit: str, drawn: str = "") -> str:
         return ""
     own = size * length_factor(unit, drawn)
     likely = [name for name in LENGTHS if SMALLEST <= own * length_factor(name, "m") <= LARGEST]
-    note = f"the plan is {f'{metres / 1000:.4g} km' if metres > LARGEST else f'{metres * 1000:.4g} mm'} long"
+    note = (
+        f"the {what} is {f'{metres / 1000:.4g} km' if metres > LARGEST else f'{metres * 1000:.4g} mm'} long"
+    )
     if not likely:
         return f"{note}; check its unit, which is {drawn or unit}"
     if not drawn:
-        return f'{note}; are its numbers in {likely[0]}? Then type units = "{likely[0]}"'
+        where = f" in [mesh], or --units {likely[0]}" if what == "mesh" else ""
+        return f'{note}; are its numbers in {likely[0]}? Then type units = "{likely[0]}"{where}'
     note += f"; is the drawing in {likely[0]}? Its unit is {drawn}: set it to {likely[0]} in CAD, or write"
     return f'{note} the project with pcmc plan and type units = "{likely[0]}" there'

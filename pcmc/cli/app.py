@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
+from ..base.errors import OptionError
 from .arguments import with_groups
 from .building import pattern, structure
 from .drawing import draw_, panels_, report_
 from .files import cache_, convert, explore, plan, plot, repair_, schema
 from .solving import certify_, equilibria_, remesh_, solve_, sweep
+
+
+class Command(TyperCommand):
+    """A command that refuses an option given twice, of which the library would take the last."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        *_, order = self.make_parser(ctx).parse_args(args=[*args])
+        for option in order:
+            if order.count(option) > 1 and not getattr(option, "multiple", True):  # an argument has none
+                raise OptionError(f"{option.opts[-1]} is given twice; keep one", what=option.opts[-1])
+        return super().parse_args(ctx, args)
+
 
 app = typer.Typer(
     add_completion=False,
@@ -62,4 +76,4 @@ for name, command, summary in (
     ("explore", explore, "Change tensions and pressures with sliders, in the browser."),
     ("cache", cache_, "Show or remove the roofs that are kept."),
 ):
-    app.command(name, short_help=summary)(with_groups(command))
+    app.command(name, cls=Command, short_help=summary)(with_groups(command))

@@ -14,12 +14,12 @@ from ..base.files import suffix_of
 from ..base.units import Units
 from ..certificate.certificate import require_certified
 from ..drawings.drawing_set import NET_SUFFIXES, NET_TABLES, net_files, table_paths
-from ..io import FORMATS, write
+from ..io import FORMATS
 from ..panelling.panel_net import check_grid
 from ..plot import families, panel_planarity
 from ..project.drawn import files_of
 from ..project.settings import Output, cost_paths, schedule_paths
-from ..project.writing import check_outputs, cost_jobs, schedule_jobs, write_all
+from ..project.writing import certified_files, check_outputs, cost_jobs, schedule_jobs, write_all
 from . import arguments, reports
 from .arguments import MANY_FILES, OUTPUT, Build, FileUnits, Input, MeshCheck, SheetFormat, ViewName
 from .options import amount, count, option, parsed_number, switch
@@ -115,12 +115,14 @@ def panels_(
             fewer = roof.fewer_families(tolerance, change, **how)
             schedule = fewer.after
         works: list[Any] = []
+        place = {"georeference": roof.output.georeference}
         for path in files:
             if path.suffix.lower() == CSV:
                 works += schedule_jobs(path, schedule)
                 works += cost_jobs(path, fewer.costs(*prices)) if prices is not None else []
             else:
-                works.append((path, partial(write, surface=schedule.surface, units=roof.units)))
+                what = schedule.surface, schedule.certificate, [path], roof.units
+                works += certified_files(*what, besides=place, mark=roof.mark)
         if picture is not None:
             works.append((picture, partial(families, schedule, view=seen)))
         written = write_all(works, progress)

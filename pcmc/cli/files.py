@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import warnings
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -27,7 +28,7 @@ from ..project.writing import check_outputs, picture_job, surface_files, write_a
 from ..surface import Surface
 from ..sweep.case_script import resolve
 from . import NOT_CERTIFIED, OK, arguments, reports
-from .arguments import OUTPUT, TOML, Cache, FileUnits, Input, Shown, Start, ViewName, Whole, load_project
+from .arguments import OUTPUT, TOML, Cache, FileUnits, Input, Shown, Start, Whole, load_project
 from .options import amount, count, option, parsed_unit, switch
 from .reports import working
 
@@ -37,6 +38,8 @@ EXAMPLE = "A generator, such as two_caps, instead of a file."
 PARAMETER = "Parameter of the example; may be repeated."
 WATCH = "Follow the file: when it, or a drawing that it refers to, is saved, the page shows the new roof."
 COLOUR = "--colour", "--color"
+SEEN = "diagonal, elevation, plan, or AZIMUTH,ELEVATION in degrees; by default the project's, or diagonal."
+COLOURED = "patches, curvature, error or reactions; by default the project's, or patches."
 
 
 def convert(
@@ -80,8 +83,8 @@ def plot(
     *,
     file: Input,
     picture: Annotated[Path, typer.Argument(metavar="PNG")],
-    view: ViewName = "diagonal",
-    colour: Annotated[str, option("NAME", "patches, curvature, error or reactions.", *COLOUR)] = "patches",
+    view: Annotated[str, option("NAME", SEEN)] = "",
+    colour: Annotated[str, option("NAME", COLOURED, *COLOUR)] = "",
     what: Shown,
     whole: Whole = False,
 ) -> int:
@@ -93,11 +96,13 @@ def plot(
       pcmc plot roof.toml start.png --start
       pcmc plot half.pcmc roof.png --whole
     """
-    seen = arguments.parsed_view(view, picture)
-    arguments.output_of(file, picture=picture, view=seen, colour=colour)
+    given: dict[str, Any] = {"picture": picture} | ({"colour": colour} if colour else {})
+    given |= {"view": arguments.parsed_view(view, picture), "views": None} if view else {}
+    arguments.output_of(file, **given)
     if (roof := _good(file, what, whole)) is None:
         return NOT_CERTIFIED
-    return reports.ended(True, write_all([picture_job(roof, picture, [seen], colour)]))
+    look = replace(roof.output, **given)
+    return reports.ended(True, write_all([picture_job(roof, picture, look.all_views, look.colour)]))
 
 
 def explore(

@@ -194,7 +194,8 @@ def remesh_(
     written = arguments.output_of(file, files=output)
     with working() as progress:
         project = arguments.load_project(file, units)
-        project = replace(project, output=replace(written, whole=project.output.whole))
+        kept = {"whole": project.output.whole, "georeference": project.output.georeference}
+        project = replace(project, output=replace(written, **kept))
         if solve:
             check = bool(project.mesh_check)
             project = replace(project, folder=file.parent, remeshing=(stage,), mesh_check=check)
@@ -371,6 +372,7 @@ def equilibria_(
         if not found.found:
             raise KeyboardInterrupt  # it was stopped before the first
         jobs: list[Any] = []
+        place = {"georeference": roof.output.georeference}
         for path in files:
             if path in pictures:
                 jobs.append((path, partial(diagram, found, y=axis, units=roof.units)))
@@ -379,7 +381,8 @@ def equilibria_(
             else:
                 warn_of_members(roof, path.name)
                 for k, one in enumerate(found.found, 1):
-                    jobs += certified_files(one.surface, one.certificate, [_numbered(path, k)], roof.units)
+                    named = [_numbered(path, k)]
+                    jobs += certified_files(one.surface, one.certificate, named, roof.units, "", place)
         written = write_all(jobs, progress)
     print(found.text(roof.units))
     return reports.ended(True, written)

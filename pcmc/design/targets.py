@@ -80,6 +80,9 @@ class Target:
             raise OptionError(message, what="of", found=self.of)
         if not isinstance(self.name, str):
             validate.refuse("name", self.name, "a text")
+        if self.name and self.quantity != "height":
+            text = f"name: is of the point of a height; leave it out, or name a part: of = {self.name!r}"
+            raise OptionError(text, what="name", found=self.name)
         for key in ("value", "at_most", "at_least"):
             if getattr(self, key) is not None:
                 validate.number(key, getattr(self, key), where=self.label)

@@ -90,7 +90,7 @@ class Equilibria:
     found : the equilibria by energy, the lowest first; numbers count from 1.
     ways : the ways down from each saddle of index 1.
     lines, branches : the parameters that were followed, and for each the branches in it.
-    searched, failed : sentences: what was tried, and what of it did not work out.
+    searched, failed : sentences: what was tried, and what did not work out, or only as the mesh is coarse.
     stopped : whether the search was stopped before its end.
     """
 
@@ -178,8 +178,8 @@ class Equilibria:
         if half:
             half = f"All this is of a part of the roof; shapes that are not symmetric in {half} were left out"
             half += " (--whole, or the surface that pcmc.mirrored unfolds, has them)."
-        given = "The search was stopped before its end." if self.stopped else ""
-        words = [*self.barrier_lines(units), *self.searched, *self.failed, given, half, INCOMPLETE]
+        stopped = "The search was stopped before its end." * self.stopped
+        words = [*self.barrier_lines(units), *self.searched, *self.failed, stopped, half, INCOMPLETE]
         return "\n".join(line for line in (units.sentence if units else "", rows, *words) if line)
 
     def barrier_lines(self, units: Units = NO_UNITS) -> list[str]:

@@ -16,6 +16,9 @@ from ..base.errors import NoBranch, OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..base.tolerances import AT_REST
 from ..certificate import certify
+from ..certificate.verdict import only_coarse
+from ..forces.loose_parts import part_size
+from ..forces.pinching import standing_part
 from ..solvers import solve
 from ..solvers.continuation import BoundaryMotion, Branch, Direction
 from ..solvers.result import Progress, Result, Status
@@ -222,6 +225,8 @@ class _Search:
             raise StopIteration
         self.found.append(FoundEquilibrium(surface, certificate, how))
         self.shapes.append(shape)
+        why = only_coarse(surface, standing_part(surface).walls.pinchable)
+        self.failed += [f"The equilibrium {how}: {why}."] * bool(why)
         return len(self.found) - 1
 
     def follow(self, line: TracedParameter, number: int) -> None:
@@ -273,12 +278,10 @@ class _Search:
         ``led_to`` are those that the branches it comes from have led to.
         """
         now = f"{line.name} {line.value:.4g}"
-        if isinstance(there, str):
-            self.failed.append(f"A branch passes {now}, but its equilibrium there was not reached: {there}.")
-            return
-        k = self.add(with_good_triangles(there), how)
+        k = None if isinstance(there, str) else self.add(with_good_triangles(there), how)
         if k is None:
-            self.failed.append(f"A branch passes {now}, but its equilibrium there cannot be certified.")
+            why = f"was not reached: {there}" if isinstance(there, str) else "cannot be certified"
+            self.failed.append(f"A branch passes {now}, but its equilibrium there {why}.")
             return
         self.on_branch.add((line.name, k))
         if beside and k in led_to:
@@ -326,9 +329,8 @@ class _Search:
 
     def deflate(self, number: int) -> None:
         """Deflated Newton from starts around an equilibrium."""
-        one, size = self.found[number], self.surface.size
-        random = np.random.default_rng([self.options.seed, number])
-        modes = one.certificate.modes
+        one, random = self.found[number], np.random.default_rng([self.options.seed, number])
+        modes, size = one.certificate.modes, part_size(self.surface)
         unit = modes / np.linalg.norm(modes, axis=2).max(axis=1)[:, None, None]
         for _ in range(self.options.starts if len(modes) else 0):
             self.tell(f"deflated Newton around equilibrium {number + 1}")
@@ -357,10 +359,8 @@ class _Search:
     def result(self) -> Equilibria:
         """The equilibria by energy, the numbers of the ways down with them."""
         order = sorted(range(len(self.found)), key=lambda k: self.found[k].energy)
-        number = {k: place for place, k in enumerate(order, 1)}
-        ways = [
-            replace(w, saddle=number[w.saddle], to=None if w.to is None else number[w.to]) for w in self.ways
-        ]
+        number: dict[int | None, int] = {k: place for place, k in enumerate(order, 1)}
+        ways = [replace(w, saddle=number[w.saddle], to=number.get(w.to)) for w in self.ways]
         branches = {line.name: tuple(self.branches[line.name]) for line in self.lines}
         searched = [
             f"Branches followed in {line.name}, from {line.span[0]:.4g} to {line.span[1]:.4g}"

@@ -168,8 +168,8 @@ class PageHandler(BaseHTTPRequestHandler):
             case ["GET", "page", name]:
                 self._send_file(name)
             case ["GET", "api", session, "export"]:
-                name, body = explorer.export(session, parse_qs(parts.query).get("suffix", [""])[0])
-                self._send(body, BYTES, name)
+                name, body, note = explorer.export(session, parse_qs(parts.query).get("suffix", [""])[0])
+                self._send(body, BYTES, name, note)
             case ["POST", "api", *session, act] if act in REQUESTS and len(session) == (act != "open"):
                 turn = re.fullmatch(r"(\w{1,20}) (\d{1,9})", self.headers.get("X-Turn", ""))
                 place = None if turn is None else (turn[1], int(turn[2]))
@@ -198,11 +198,15 @@ class PageHandler(BaseHTTPRequestHandler):
             raise RequestError(f"there is no file {name!r:.60}", HTTPStatus.NOT_FOUND)
         self._send(file.read_bytes(), f"{kind}; charset=utf-8")
 
-    def _send(self, body: bytes, kind: str, file: str = "", status: HTTPStatus = HTTPStatus.OK) -> None:
-        """Answer with a body, which the browser saves under the name of a ``file`` if there is one."""
+    def _send(
+        self, body: bytes, kind: str, file: str = "", note: str = "", status: HTTPStatus = HTTPStatus.OK
+    ) -> None:
+        """Answer with a body, which the browser saves under the name of a ``file`` if there is one; the page
+        shows the ``note``."""
         headers = {**HEADERS, "Content-Type": kind, "Content-Length": str(len(body))}
         if file:
             headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(file, safe='')}"
+            headers["X-Note"] = quote(note)
         if self.close_connection:
             headers["Connection"] = "close"
         self.server.limit(self.connection)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 import secrets
 import tempfile
 import threading
-import warnings
 from collections import OrderedDict
 from collections.abc import Callable
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import FileWarning, SurfaceError, unknown
+from ..base.errors import SurfaceError, unknown
 from ..drawings.sheet import MISSED
 from ..io import FORMATS
 from ..project import load
@@ -201,23 +199,21 @@ class Explorer:
                     self.watch.seen = signature(path)
         return {"saved": path.name, "note": note}
 
-    def export(self, session: str, suffix: str) -> tuple[str, bytes]:
-        """The name and the content of a file with the surface of a session."""
+    def export(self, session: str, suffix: str) -> tuple[str, bytes, str]:
+        """The name and the content of a file with the surface of a session, and what the format loses."""
         state, roof = self.session(session).state(), self.roof
         if suffix not in FORMATS:
             raise RequestError(unknown("format", suffix[:60], FORMATS))
-        # the page lists what formats carry; a rule for this module alone, as threads share the rules
-        warnings.filterwarnings("ignore", category=FileWarning, module=re.escape(__name__))
         known = {(False, "certificate"): state.certificate}
         outcome = dataclasses.replace(roof.outcome, result=None, start=state.surface, data=None, _known=known)
         besides = filed_besides(outcome) if FORMATS[suffix].besides else {}
         targets, _ = state.aims or roof.aims
-        mark = "" if roof.meets(state.surface, targets) else MISSED
+        mark, notes = "" if roof.meets(state.surface, targets) else MISSED, list[str]()
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"surface{suffix}"
             for file, write in certified_files(*outcome.shown, [path], outcome.units, "", besides, mark):
-                write(file)
-            return f"{roof.name}{suffix}", path.read_bytes()
+                write(file, notes=notes)
+            return f"{roof.name}{suffix}", path.read_bytes(), "; ".join(notes)
 
     def wait(self) -> None:
         """Return when the server is closed."""

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from ..base.arrays import Floats
 from ..base.errors import FileError, unknown
 from ..base.units import Units
-from ..surface import HeldCurve, Surface
+from ..surface import HeldCurve, Plane, Surface
 from .georeference import Georeference
 
 LOST = ("order", "images")
@@ -96,6 +96,7 @@ PARTS = {
     "cables": FormatPart("cables", 6, lambda surface, _: surface.cables),
     "cable weights": FormatPart("weights of cables", 8, lambda surface, _: surface.cable_edges.weight.any()),
     "rooms": FormatPart(ROOMS, 6, lambda surface, _: surface.rooms),
+    "plane": FormatPart("its plane Π", 1, lambda surface, _: surface.plane != Plane()),
     "planes": FormatPart(PLANES, 6, lambda surface, _: surface.on_planes),
     "curves": FormatPart("", 7, lambda surface, _: surface.held_curves),
     "bent curves": FormatPart(BENT, 7, lambda surface, _: any(map(_bent, surface.held_curves))),

@@ -25,6 +25,7 @@ from ..surface.values import KINDS, POWERS
 
 FREE, SLIDING, FIXED = 0, 1, 2
 HELD = {"fixed": FIXED, "sliding": SLIDING}  # names of groups and layers of supports
+CURVATURE = "mean curvature"  # the scalar of that name, 1/length
 TOLERANCE = 1e-7  # of the size, to merge vertices; single precision keeps this much
 ROUNDING = 1e-6  # of the size: the most that a format rounds by
 
@@ -252,7 +253,8 @@ def scaled_surface(surface: Surface, factor: float) -> Surface:
 def converted(data: MeshData, length: str, assumed: str = "") -> MeshData:
     """A file's data in another unit of length, if any is given, with a note if that changes them.
 
-    ``assumed`` is the unit of a file that names none. Scalars stay, and tensions that the file does not have.
+    ``assumed`` is the unit of a file that names none. Scalars besides curvature stay, and tensions that the
+    file does not have. Of a certificate the mark alone is kept.
     """
     units = data.units or Units(assumed, data.units.force)
     factor = length_factor(units.length, length)
@@ -261,5 +263,8 @@ def converted(data: MeshData, length: str, assumed: str = "") -> MeshData:
     parts = {f.name: in_new_unit(getattr(data, f.name), factor) for f in fields(data)}
     parts["patches"] = tuple(p if p.name in data.bare else in_new_unit(p, factor) for p in data.patches)
     parts["vertices"] = factor * np.asarray(data.vertices, dtype=np.float64)
+    parts["scalars"] = {k: v / factor if k == CURVATURE else v for k, v in data.scalars.items()}
+    parts["certificate"] = {k: v for k, v in data.certificate.items() if k == "mark"}
     notes = (*data.notes, conversion_note(units.length, length))
+    notes += ("its certificate is left out",) if len(parts["certificate"]) < len(data.certificate) else ()
     return replace(data, **parts | {"units": Units(length, units.force), "notes": notes})

@@ -39,6 +39,7 @@ def write(
     cable_areas: Mapping[str, float] | None = None,
     mark: str = "",
     georeference: Georeference | None = None,
+    notes: list[str] | None = None,
 ) -> None:
     """Write a surface as the suffix says; the file appears whole or not at all.
 
@@ -60,6 +61,7 @@ def write(
     cable_areas : of the sections of its cables there, length², by name.
     mark : in the file where the certificate has none, such as "TARGETS NOT MET"; .stl has no place for one.
     georeference : its place on a map, for .ifc.
+    notes : a list to which the texts of the warnings are added, instead of warning.
 
     Warns
     -----
@@ -138,12 +140,15 @@ def write(
             note = form.functions.write(temporary, shown, Content(*about, georeference))
         except PcmcError as error:
             raise error.in_file(path, FileError, str(path)) from None
+    losses = ""
     if lost:
         lost += ["supports", "tensions", "pressures"] if form.bare else []
-        text = f"{path}: a {path.suffix} file cannot carry {', '.join(lost)}; left out"
-        warnings.warn(text, LostWarning, stacklevel=2)
-    if note:
-        warnings.warn(f"{path}: {note}", FileWarning, stacklevel=2)
+        losses = f"a {path.suffix} file cannot carry {', '.join(lost)}; left out"
+    for text, kind in ((losses, LostWarning), (note, FileWarning)):
+        if text and notes is not None:
+            notes.append(text)
+        elif text:
+            warnings.warn(f"{path}: {text}", kind, stacklevel=2)
 
 
 def _scalar(surface: Surface, name: str, value: npt.ArrayLike) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from ..base import validate
 from ..base.errors import OptionError, unknown
 from ..base.units import NO_UNITS, Units
+from ..forces.rooms import energy_at_volumes
 from ..surface import Patch, Surface
 from .curves import add_branches, add_legend, label_axes
 from .figure import CURVES, INK, SMALL, TEXT, Image, Path, finish, grid, new, style
@@ -17,6 +19,7 @@ from .pictures import RED, draw, panel
 if TYPE_CHECKING:
     from ..cloth import CuttingPattern
     from ..equilibria import Equilibria
+    from ..solvers.continuation import Branch
     from ..structure import Analysis
     from ..structure.analysis import Case
 
@@ -205,7 +208,9 @@ def equilibria(
     places = figure.add_gridspec(len(heights), columns, height_ratios=heights)
     if line is not None:
         axes = style(figure.add_subplot(places[0, :]))
-        branches = {f"branch {k}": branch for k, branch in enumerate(found.branches[line.name], 1)}
+        own = found.branches[line.name]
+        own = tuple(map(_at_volumes, own)) if y == "energy" else own
+        branches = {f"branch {k}": branch for k, branch in enumerate(own, 1)}
         count = add_branches(axes, branches, "parameter", y)
         axes.axvline(line.value, color=INK, linewidth=0.6, linestyle=":")
         at = {"xytext": (4, 4), "textcoords": "offset points", "fontsize": TEXT, "color": INK}
@@ -225,3 +230,11 @@ def equilibria(
         text = f"{k}: {kind}\nE = {one.energy:.5g}{units.behind('energy')}"
         axes.set_title(text, fontsize=SMALL, color=INK)
     return finish(figure, path)
+
+
+def _at_volumes(branch: Branch) -> Branch:
+    """The branch with energies as equilibria have them: at the volumes, where rooms prescribe these."""
+    tables = (branch.points, branch.surfaces), (branch.events, branch.event_surfaces)
+    energies = ([energy_at_volumes(surfaces[k]) for k in rows.index] for rows, surfaces in tables)
+    points, events = (rows.assign(energy=own) for (rows, _), own in zip(tables, energies, strict=True))
+    return replace(branch, points=points, events=events)

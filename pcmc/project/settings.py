@@ -49,6 +49,7 @@ DOCUMENTS = {  # keys of files for those who build, with their suffixes and what
 }
 SINGLE = ("picture", "panels", "structure", "report")  # keys of one file each
 LISTS = ("files", "drawings", "net", "pattern")  # keys of several files
+NET_KEYS, PICTURE_KEYS = ("net_pattern", "net_direction"), ("view", "views", "colour")
 SECTION = TypeVar("SECTION")
 
 
@@ -221,10 +222,12 @@ class Output:
         if bool(self.net) != (self.net_size is not None):
             text = "files of a net need net_size = LENGTH, the edge of its panels, and net_size needs net"
             raise OptionError(f"net: {text}", what="net_size" if self.net else "net")
-        for name in () if self.net else ("net_pattern", "net_direction"):
-            if getattr(self, name) != getattr(Output, name):
-                text = f"{name}: counts only with net = [...]; give it, too, or leave {name} out"
-                raise OptionError(text, what=name, found=getattr(self, name))
+        parts = {"net = [...]": self.net, "picture = ...": self.picture}
+        for part, names in zip(parts, (NET_KEYS, PICTURE_KEYS), strict=True):
+            for name in () if parts[part] else names:
+                if getattr(self, name) != getattr(Output, name):
+                    text = f"{name}: counts only with {part}; give it, too, or leave {name} out"
+                    raise OptionError(text, what=name, found=getattr(self, name))
         for name in ("panels", "panel_sheets"):
             if getattr(self, name) and self.tolerance is None:
                 text = f"{name}: needs the largest difference of edges in a family; add tolerance = LENGTH"

@@ -17,7 +17,7 @@ from ..base import validate
 from ..base.arrays import Bools
 from ..base.errors import FileWarning, OptionError, PlanError
 from ..base.files import PathLike
-from ..base.units import NO_UNITS, Units
+from ..base.units import NO_UNITS, Units, unlikely_size
 from ..design import Parameter, Target
 from ..io import read_bare
 from ..io.mesh_data import MeshData
@@ -44,6 +44,9 @@ def start_of(project: Project) -> Outcome:
             text += f" make it {own!r}, or leave it out"
             raise OptionError(text, what="force", found=force, expected=own)
         units = Units(data.units.length, force or own)
+        width = float(np.ptp(surface.vertices, axis=0).max())
+        if note := unlikely_size(width, units.length, what="mesh"):
+            warnings.warn(f"{project.path}: {note}", FileWarning, stacklevel=2)
         surface, targets, vary = first_tensions(surface, project.mesh)
         typed = targets and project.mesh.rises[0].kind in project.data.get("mesh", ())
         for name in vary[0].names if typed else ():
@@ -94,6 +97,9 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
     values: dict[str, dict[str, float]] = {kind: {} for kind in ("tensions", "pressures", "weights", "snows")}
     if mesh.tension is not None:
         loaded = {p.name for p in surface.patches if not p.auxiliary} - {*sheets_below(surface).values()}
+        if all("tension" in mesh.patches.get(name, ()) for name in loaded):
+            text = "mesh.tension: no patch under pressure is without its own in mesh.patches; leave it out"
+            raise OptionError(text, what="mesh.tension", found=mesh.tension)
         values["tensions"] |= dict.fromkeys(loaded, mesh.tension)
     for name, own in mesh.patches.items():
         patch = surface.patches[surface.patch_index(name)]  # refuses one that is not there
@@ -170,8 +176,11 @@ def first_tensions(surface: Surface, mesh: MeshFile) -> tuple[Surface, list[Targ
     names, targets, vary = [p.name for p in pressed if p.name not in below], [], []
     roof = np.array([p.name in names for p in surface.patches])[surface.patch_of_face]
     vectors = area_vectors(surface.vertices[surface.faces[roof]])
-    plan = abs(float((vectors @ np.array(surface.plane.normal)).sum()))
-    least = plan / float(segment_lengths(surface.vertices, held).sum())
+    plan = float((vectors @ np.array(surface.plane.normal)).sum())  # below 0 if the triangles face down
+    if max(p.net_pressure * plan for p in pressed) <= 0.0:
+        text = f"{mesh.rises[0].kind} is for a roof that a pressure lifts, and none does here;"
+        raise OptionError(f"{text} give another pressure, or a tension", what=mesh.rises[0].kind)
+    least = abs(plan) / float(segment_lengths(surface.vertices, held).sum())
     for rise in mesh.rises:
         if rise.kind == "rise" and heights.size and np.ptp(heights) > NEAR * surface.size:
             text = f"{rise.kind}: the supports are not level, so a rise over them is not defined; give apex"

@@ -26,7 +26,7 @@ from ..forces.rooms import refuse_varied_pressure
 from ..plan import Curve, Divider, Hole, Plan
 from ..surface import Plane, Surface
 from ..surface.surface import FIELDS
-from ..surface.values import KINDS, all_values
+from ..surface.values import KINDS, all_values, sheets_below
 from .cache import plain_bytes
 from .checking import in_file
 from .drawn import files_of
@@ -165,8 +165,12 @@ class _Source(NamedTuple):
             if kind == "tensions":
                 same += [f"plan.dividers.{line}.wall" for line in (part, part.removeprefix("wall "))]
             same += [other for other in values if other != name and known.get(other) == known[name]]
+            following = {p.name for p in surface.patches if p.wall} | {*sheets_below(surface).values()}
+            named = {known[other][1] for other in values if other in known and known[other][0] == kind}
+            if part not in following and {p.name for p in getattr(surface, parts)} <= named | following:
+                same += [f"{table}.{kind.removesuffix('s')}" for table in ("plan", "mesh")]
             if twice := [other for other in same if other in values]:
-                text = f"{self.path}: {name} and {twice[0]} are one number; give one of them"
+                text = f"{self.path}: {name} and {twice[0]} set the same number; give one of them"
                 raise OptionError(text, what=name, found=twice[0])
             given[kind][part] = values[name]
         with in_file(self.path, OptionError):

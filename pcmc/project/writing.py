@@ -22,6 +22,7 @@ from ..certificate.certificate import Certificate
 from ..cloth.sheets import pattern_files
 from ..drawings.drawing_set import net_files
 from ..forces.curvature import curvature_error, mean_curvature
+from ..io.mesh_data import CURVATURE
 from ..panelling import Panels
 from ..plot import draw, lines, member_forces, panel, reactions, under_load
 from ..structure import Analysis, StructuralModel, write_structure
@@ -40,7 +41,7 @@ WRITERS = (  # libraries that some formats need, whatever is in the file, with t
     ("ezdxf", "cad", (".dxf",)),
     ("pyarrow", "files", (".parquet",)),
 )
-FileJob = tuple[Path, Callable[[Path], Any]]  # a file with the function that writes it
+FileJob = tuple[Path, Callable[..., Any]]  # a file with the function that writes it
 FileJobs = list[FileJob]
 
 
@@ -123,7 +124,7 @@ def certified_files(
     """The files of a surface at rest: what their formats hold of its certificate, mean curvature (1/length),
     relative curvature error, size of the reactions at supports (force), and ``filed_besides``; with the
     ``mark`` where the certificate has none."""
-    scalars = {"mean curvature": mean_curvature(surface), "error": curvature_error(surface)}
+    scalars = {CURVATURE: mean_curvature(surface), "error": curvature_error(surface)}
     scalars["reaction"] = np.linalg.norm(certificate.reactions, axis=1)
     jobs: FileJobs = []
     for file in map(Path, files):
@@ -245,7 +246,7 @@ def check_outputs(
         raise FileError(f"{made} is a file; the output needs a folder", what=str(made))
     for path in paths:
         check_name(path)
-        place, folder, problem = os.path.normcase(path.resolve()), path.parent, None
+        place, folder, problem = str(path.resolve()).casefold(), path.parent, None  # alike on some systems
         try:
             is_folder = path.is_dir()
             there = next(f for f in (folder.absolute(), *folder.absolute().parents) if f.exists())
@@ -257,8 +258,10 @@ def check_outputs(
             problem = "is read here, and is not written over; name another file"
         elif path.exists() and not path.is_file():
             problem = "is a pipe or a device; name a file"
+        elif path.exists() and not os.access(path, os.W_OK):
+            problem = "is there and read-only; name another file, or let it be written"
         elif place in seen:
-            problem = "is named twice; name two files for the output"
+            problem = "is named twice, if capitals count as small letters; name two files"
         elif folder != made and not folder.is_dir():
             problem = f"there is no folder {folder}; create it first"
         elif not there.is_dir():

@@ -20,8 +20,11 @@ from ..surface.values import in_the_open
 
 GRAVITY = 9.81  # m/s²
 FORM = "form"  # what combinations call the form-finding load
+FORM_STEPS = ("form pressure", "form pressure less snow")  # its step without snow, and with
 EVEN = 1e-6  # of the size, squared: a patch with less area in the plan faces to neither side
 STEEPEST = 180.0  # degrees: a face that looks down
+PARTS = 10  # along each side of a face, of which each is within an area or not
+SAME = 0.1  # of a face: a smaller difference of two areas is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +89,7 @@ class Snow:
             hint = "all patches are walls; name those that carry snow"
             validate.refuse("Snow.patches", self.patches, "names of patches", hint=hint)
         normal, plan = np.array(surface.plane.normal), np.maximum(plan_areas(surface), 0.0)
-        plan[~(np.isin(surface.patch_of_face, carrying) & _in_zone(self, surface))] = 0.0
+        plan *= _in_zone(self, surface, np.isin(surface.patch_of_face, carrying))
         if self.slides:
             whole, none = self.slides
             plan *= np.clip((none - roof_slopes(surface)) / (none - whole), 0.0, 1.0)
@@ -127,8 +130,10 @@ class Wind:
         for name in (name for name in self.pressures if down[surface.patch_index(name)]):
             text = f"{self.name}: the triangles of {name!r} face down, so wind above 0 pushes it down and is"
             warnings.warn(f"{text} no suction; give the other sign, or turn them", LoadWarning, stacklevel=2)
-        by_patch[[surface.patch_index(zone) for zone in self.pressures]] = [*self.pressures.values()]
-        more = _in_zone(self, surface) * by_patch[surface.patch_of_face]
+        zones = [surface.patch_index(zone) for zone in self.pressures]
+        by_patch[zones] = [*self.pressures.values()]
+        more = by_patch[surface.patch_of_face]
+        more *= _in_zone(self, surface, np.isin(surface.patch_of_face, zones))
         return replace(step, pressures=step.pressures + more)
 
 
@@ -163,7 +168,7 @@ def load_steps(
     ends, _, per_length = surface.cable_edges
     per_edge = 1.5 * per_length * segment_lengths(surface.vertices, ends)
     np.add.at(weight, ends, per_edge[:, None, None] * downwards)
-    name = "form pressure less snow" if surface.snows.any() else "form pressure"
+    name = FORM_STEPS[int(surface.snows.any())]
     form = permanent = Step(name, surface.net_pressures[surface.patch_of_face], weight)
     steps, added = [form], {FORM: (form, nothing(form))}
     for together in map(acting_together, loads):
@@ -208,19 +213,22 @@ def check_loads(
     expected = "a sequence of SelfWeight, Snow or Wind, or of tuples of these"
     if isinstance(loads, Load) or not isinstance(loads, Sequence):
         validate.refuse("loads", loads, expected)
+    every = [load for entry in loads for load in acting_together(entry)]
+    if len({load.gravity for load in every if isinstance(load, SelfWeight)}) > 1:
+        text = "loads: self-weights of several gravities, of which one replaces the other; give them one"
+        raise OptionError(text, what="loads")
     leaning = leaning_mirrors(surface.plane, surface.on_planes)
-    for entry in loads:
-        for load in acting_together(entry):
-            if not isinstance(load, Load):
-                validate.refuse("loads", load, expected)
-            if leaning and not isinstance(load, Wind):
-                text = f"{load.name}: the {leaning[0]} leans over Π, and behind it down is elsewhere"
-                raise OptionError(f"{text}; take the whole roof, pcmc.mirrored(surface)", what="loads")
-            for name in getattr(load, "patches", ()):
-                surface.patch_index(name)
-                if name in replaced:
-                    text = f"{load.name}: a member stands in the place of {name!r}, so no load acts on it"
-                    raise OptionError(f"{text}; leave it out", what="loads", where=name)
+    for load in every:
+        if not isinstance(load, Load):
+            validate.refuse("loads", load, expected)
+        if leaning and not isinstance(load, Wind):
+            text = f"{load.name}: the {leaning[0]} leans over Π, and behind it down is elsewhere"
+            raise OptionError(f"{text}; take the whole roof, pcmc.mirrored(surface)", what="loads")
+        for name in getattr(load, "patches", ()):
+            surface.patch_index(name)
+            if name in replaced:
+                text = f"{load.name}: a member stands in the place of {name!r}, so no load acts on it"
+                raise OptionError(f"{text}; leave it out", what="loads", where=name)
     return tuple(loads)
 
 
@@ -229,14 +237,15 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
     cases = [FORM, *(step_name(acting_together(entry)) for entry in loads)]
     if not isinstance(given, Mapping):
         validate.refuse("combinations", given, "factors by name, such as {'uls': {'snow': 1.5}}")
-    if len(set(cases)) < len(cases):
-        name = next(name for name in cases if cases.count(name) > 1)
+    taken = [*FORM_STEPS, *cases]
+    if len(set(taken)) < len(taken):
+        name = next(name for name in taken if taken.count(name) > 1)
         text = f"loads: two cases are called {name!r}; give each a name of its own"
         raise OptionError(text, what="loads", found=name)
     checked: dict[str, dict[str, float]] = {}
     for name, factors in given.items():
         validate.checked_name("name of a combination", name)
-        if name in cases:
+        if name in taken:
             text = f"combination {name!r}: a case has this name; give the combination another one"
             raise OptionError(text, what="combinations", found=name)
         if not isinstance(factors, Mapping) or not factors:
@@ -252,9 +261,11 @@ def check_combinations(given: object, loads: Sequence[Load | Sequence[Load]]) ->
 
 def plan_areas(surface: Surface) -> Floats:
     """(m,) the area of each face in the plan, below 0 if it overhangs, length². The side of a patch that
-    looks away from Π is the one of the larger part of its plan."""
-    plan: Floats = area_vectors(surface.vertices[surface.faces]) @ np.array(surface.plane.normal)
-    return plan * np.sign(np.bincount(surface.patch_of_face, plan))[surface.patch_of_face]
+    looks away from Π is the one of the larger part of its plan, or of an upright patch of its higher part."""
+    P, patch = surface.vertices[surface.faces], surface.patch_of_face
+    plan: Floats = area_vectors(P) @ np.array(surface.plane.normal)
+    sides, higher = (np.bincount(patch, plan * by) for by in (1.0, surface.plane.height(P).mean(axis=1)))
+    return plan * np.sign(np.where(np.abs(sides) > EVEN * surface.size**2, sides, higher))[patch]
 
 
 def roof_slopes(surface: Surface) -> Floats:
@@ -263,35 +274,39 @@ def roof_slopes(surface: Surface) -> Floats:
     return np.asarray(np.degrees(np.arccos(np.clip(up, -1.0, 1.0))))
 
 
-def _in_zone(load: Snow | Wind, surface: Surface) -> Bools:
-    """(m,) the faces whose slope is a load's, and whose middle is in its area.
+def _in_zone(load: Snow | Wind, surface: Surface, carrying: Bools) -> Floats:
+    """(m,) how much of each face is in a load's area, if its slope is the load's and it is ``carrying`` (m,).
 
-    OptionError where there are none, and for an area that goes on behind a mirror plane, but not as the image
-    of what is in front.
+    OptionError where none is, and for an area that goes on behind a mirror plane, but not as the image of
+    what is in front.
     """
     (least, most), slope = load.slopes, roof_slopes(surface)
-    chosen: Bools = ((slope > least + 1e-9) | (least == 0.0)) & (slope <= most + 1e-9)
+    share = (carrying & ((slope > least + 1e-9) | (least == 0.0)) & (slope <= most + 1e-9)).astype(float)
     if len(load.area):
         here = in_area(load.area, surface)
         for mirror in (plane for plane, _ in surface.on_planes if plane.mirror):
             there = in_area(load.area, surface, mirror)
-            if there.any() and (there != here).any():
+            if there.any() and np.abs(there - here).max() > SAME:
                 text = f"{load.name}: its area goes on behind the {mirror}, and is another one there; let it"
                 text += " end at the mirror, or take the whole roof: --whole, or pcmc.mirrored(surface)"
                 raise OptionError(text, what=load.name)
-        chosen &= here
-    if not chosen.any():
-        text = f"{load.name}: no triangle has its middle in the area and its slope in {[least, most]}"
+        share *= here
+    if not share.any():
+        text = f"{load.name}: no triangle that carries it is in the area with its slope in {[least, most]}"
         raise OptionError(f"{text}; check the zone", what=load.name)
-    return chosen
+    return share
 
 
-def in_area(area: Sequence[Sequence[float]], surface: Surface, behind: Plane | None = None) -> Bools:
-    """(m,) the faces whose middle, or whose image ``behind`` a plane, is in a polygon of the plan."""
-    middle = surface.vertices[surface.faces].mean(axis=1)
+def in_area(area: Sequence[Sequence[float]], surface: Surface, behind: Plane | None = None) -> Floats:
+    """(m,) the share of each face in the plan, or of its image ``behind`` a plane, that is in a polygon: of
+    the middles of its ``PARTS``² parts of one size."""
+    P = surface.vertices[surface.faces]
     if behind is not None:
-        middle = middle - 2.0 * behind.height(middle)[:, None] * np.array(behind.normal)
-    return _within(area, surface.plane.to_local(middle))
+        P = P - 2.0 * behind.height(P)[:, :, None] * np.array(behind.normal)
+    P, rows = surface.plane.to_local(P), range(PARTS)
+    thirds = [(3 * i + d, 3 * j + d) for d in (1, 2) for i in rows for j in range(PARTS + 1 - d - i)]
+    places = (np.array([a, b, 3 * PARTS - a - b]) / (3.0 * PARTS) @ P for a, b in thirds)
+    return np.mean([_within(area, place) for place in places], axis=0)
 
 
 def _within(area: Sequence[Sequence[float]], places: Floats) -> Bools:

@@ -280,15 +280,19 @@ def slack_cables(table: pd.DataFrame, units: Units) -> list[str]:
 
 
 def cable_notes(model: StructuralModel) -> list[str]:
-    """That cables are as soft as the cloth, where they have the material of a patch."""
+    """That cables are as soft as the cloth, where they have the material of a patch; and that they do not
+    bend, where their member is a beam."""
+    own = [cable.name for cable in model.surface.cables]
+    bent = ", ".join(f'"{one.on}"' for one in model.members if one.kind == "beam" and one.on in own)
+    lines = [f"the members on the cables {bent} count as their sections: cables do not bend"] if bent else []
     patches = [replace(material, weft=None, shear=None) for material in model.materials]
     soft = {cable.name: of.young for cable, _, of, *_ in model.cable_edges() if of in patches}
     if not soft:
-        return []
+        return lines
     names = ", ".join(f'"{name}"' for name in soft)
     text = f"cables have the material of the patches, E = {next(iter(soft.values())):.4g}"
     text += f'{model.units.behind("pressure")}; in a project a member of kind = "cable" with on = [{names}]'
-    return [f"{text} gives them their own"]
+    return [*lines, f"{text} gives them their own"]
 
 
 def cable_offers(model: StructuralModel) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -21,7 +21,7 @@ from ..surface.curves import Curve
 from ..surface.geometry import lengths_along, segment_lengths, unit_vectors
 from ..surface.pieces import point_text, to_space
 from ..surface.topology import EdgeCurve
-from .frames import bar_axes
+from .frames import UPRIGHT, bar_axes
 from .material import Material, Profile
 
 DRAW, WHOLE = "draw the whole plan, without mirrors", "take the whole roof, whole = true"
@@ -29,6 +29,7 @@ KINDS = ("beam", "cable")
 ENDS = ("hinged", "clamped")
 BESIDE = 0.02  # of the length of edges: so near to a curve their ends are on it
 SHORTEST = 1e-6  # of the size: a shorter bar is none
+ALIKE = 1e-6  # of a second moment of area: nearer ones are the same
 FLAT = 0.02  # least singular value of the directions of bars: nearer to one plane their forces are no answer
 
 
@@ -154,7 +155,8 @@ class PlacedMember(EdgeCurve):
 
 def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[PlacedMember, ...]:
     """The lines of members on a surface, but for those of its own cables; OptionError for a member that is on
-    no edge, on a wall that rests on Π, or where another one is, and a wall that ends at one with a member.
+    no edge, on a wall that rests on Π, where another one is, or upright with a section that is not alike in
+    both directions, and for a wall that ends at one with a member.
 
     >>> from pcmc.plan import Plan
     >>> hall = Plan([[0, 0], [4, 0], [4, 2], [0, 2]], [[[2, 0], [2, 2]]], edge_length=0.5, tension=2.0)
@@ -165,16 +167,26 @@ def lines_on(surface: Surface, members: Sequence[Member]) -> tuple[PlacedMember,
     """
     lines, taken = list[PlacedMember](), np.zeros(len(surface.topology.edges), dtype=bool)
     cut, own = _mirrored(surface), [cable.name for cable in surface.cables]
+    on_cables = [str(one.on) for one in members if one.on in own]
+    for name in (name for name in own if on_cables.count(name) > 1):
+        text = f"members: {name!r} has several; leave out all but one of them"
+        raise OptionError(text, what="members", where=name)
     for member in (one for one in members if not (one.two_points or one.on in own)):
         for line in _lines_of(surface, member):
             edges = surface.topology.edge_numbers(line.pairs)
             problem = "runs where another one does; leave one of them out" if taken[edges].any() else ""
+            (high, wide), t = member.profile.moments, unit_vectors(np.diff(line.path, axis=0))
+            stands = np.linalg.norm(np.cross(surface.plane.normal, t), axis=1) <= UPRIGHT
+            if line.kind == "beam" and stands.any() and abs(high - wide) > ALIKE * high:
+                problem = "stands upright, where a section has no height; give it one that is alike all round"
             if cut[line.vertices].any():
                 problem = f"meets a mirror plane; {WHOLE if line.wall else DRAW}"
             if problem:
                 raise OptionError(f"member {line.name!r} {problem}", what="members", where=line.name)
             taken[edges] = True
             lines.append(line)
+    labels = [line.name for line in lines]
+    lines = [replace(line, name=_numbered(labels, k)) for k, line in enumerate(lines)]
     # a wall that ends at one with a member: nothing would hold its edge there
     replaced = {line.wall for line in lines}
     gone = np.array([patch.name in replaced for patch in surface.patches])
@@ -212,10 +224,9 @@ def bars_on(
         if line.member.kind == "beam":
             alone[[v for v, _ in line.ends if surface.fixed[v]]] = True
     points, near = np.flatnonzero(alone), BESIDE * float(np.median(segment_lengths(X, topo.edges)))
-    labels = [member.label for member in given]
-    for k, member in enumerate(given, 1):
-        name = member.label
-        name += f"-{labels[:k].count(name)}" if labels.count(name) > 1 else ""
+    labels = [line.member.label for line in lines] + [member.label for member in given]
+    for k, member in enumerate(given, len(lines)):
+        name = _numbered(labels, k)
         top, foot = (to_space(np.array([*p, 0.0]), plane) if len(p) == 2 else p for p in member.two_points)
         away = plane.to_local(X[points]) - plane.to_local(np.array([top]))
         here, at, problem = points[np.hypot(*away[:, :2].T) <= near], point_text(np.array(top)), ""
@@ -239,6 +250,12 @@ def bars_on(
             text += " or of two, not in one line; leave one out"
             raise OptionError(text, what="members", where=own[0].name)
     return tuple(bars)
+
+
+def _numbered(labels: Sequence[str], k: int) -> str:
+    """The label k, with a number where others are the same."""
+    same = labels.count(labels[k]) > 1
+    return f"{labels[k]}-{labels[: k + 1].count(labels[k])}" if same else labels[k]
 
 
 def at_points(bars: Iterable[PlacedMember]) -> dict[int, list[PlacedMember]]:
@@ -275,9 +292,8 @@ def _lines_of(surface: Surface, member: Member) -> Iterator[PlacedMember]:
             raise OptionError(text, what="members", found=member.on)
         found = [(name, _top(surface, k)) for name, k in walls]
     curves = [(wall, curve) for wall, edges in found for curve in surface.topology.curves_among(edges)]
-    for number, (wall, curve) in enumerate(curves, 1):
-        name = member.label if len(curves) == 1 else f"{member.label}-{number}"
-        about = name, member.kind, member, surface.vertices[curve.vertices], wall
+    for wall, curve in curves:
+        about = member.label, member.kind, member, surface.vertices[curve.vertices], wall
         yield PlacedMember(curve.vertices, curve.closed, curve.sheets, *about)
 
 

@@ -155,10 +155,11 @@ class Surface(supports.Supported, Imaged):
 
         Forces do not change with it where the pressures cancel along all edges that are not held; elsewhere
         it stays the point of Π. Far from that, as in survey coordinates, volumes would lose digits: there it
-        is the point of Π below the middle of the surface, or the middle itself, if that is far above Π and
-        nothing slides there. It lies on as many other planes as possible: they add nothing to volumes then.
+        is the point of Π below the middle of the fixed vertices, or the middle itself, if that is far above Π
+        and nothing slides there. It lies on as many other planes as possible: they add nothing to volumes.
         """
-        point, middle = np.array(self.plane.point), self.vertices.mean(axis=0)
+        X = self.vertices[self.pinned if self.pinned.any() else slice(None)]  # one point for all equilibria
+        point, middle = np.array(self.plane.point), 0.5 * (X.min(axis=0) + X.max(axis=0))
         if self.uncancelled.any():
             return point
         if np.linalg.norm(middle - point) > FAR * self.size:

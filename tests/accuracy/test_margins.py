@@ -12,7 +12,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from generators import barrel, catenoid, cylinder, joined_caps, spherical_cap, two_caps, two_squares
 from generators.catenary import FOLD
-from pcmc import Cable, Patch, Room, Surface, certify, check_mesh, margin, solve
+from pcmc import Cable, Patch, Plane, Room, Surface, certify, check_mesh, margin, solve
 from pcmc.accuracy import MarginEnd
 from pcmc.accuracy.margins import End
 from pcmc.accuracy.varied import Varied, named
@@ -52,6 +52,14 @@ def test_a_coarse_end_that_does_not_settle_yet_has_no_bar(monkeypatch):
     found = margin(cap(edge_length=0.6), "pressure")
     assert found.bar == np.inf
     assert "± unknown" in found.text()
+
+
+def test_an_end_without_a_bar_that_no_smooth_surface_reaches_is_named():
+    found = margin(cap(), "pressure", meshes=1)
+    assert found.ends_by is MarginEnd.FOLD
+    assert (
+        "only a mesh as coarse as this is at rest here, no smooth surface is: the pressure is" in found.detail
+    )
 
 
 def test_curves_that_are_guessed_are_in_the_bar(monkeypatch):
@@ -255,6 +263,19 @@ def test_a_cable_with_the_name_of_a_wall_is_none():
     named_alike = halves.rebuilt(cables=[Cable("wall", 2.0, inner)])
     assert not Varied.of(named_alike, "cable").more
     assert Varied.of(named_alike, "tension of wall").more
+
+
+def test_weights_of_a_whole_and_a_halved_cable_do_not_grow_alike():
+    """Half a sail with a cable along its edge and one in the mirror plane, which is half of the whole one."""
+    X = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    cables = [Cable("edge", 3.0, [[0, 1]]), Cable("spine", 0.5, [[0, 3]])]
+    mirror = {Plane(normal=(1, 0, 0), mirror=True): [0, 3]}
+    sail = Surface(
+        X, [[0, 1, 2], [0, 2, 3]], [0, 0], [Patch("sail", 1.0)], [1, 2], on_planes=mirror, cables=cables
+    )
+    with pytest.raises(OptionError, match="of 'spine', in a mirror plane, only a half is there"):
+        Varied.of(sail, "cable_weight")
+    assert Varied.of(sail, "weight of cable spine").unit == Varied.of(sail, "weight of cable edge").unit
 
 
 def test_what_is_not_at_rest_has_none():

@@ -198,3 +198,13 @@ def test_the_span_of_a_half_is_that_of_the_whole_roof(given):
         )
         assert outcome.good
         assert apex(outcome) == pytest.approx(1.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "patches", ["", "[plan.patches]\nwest = {rise = 1.0, PRESSED}\neast = {tension = 5.0, PRESSED}\n"]
+)
+def test_a_rise_under_suction_is_refused(given, patches):
+    """Before, it ended with "a bound on the parameters is in the way"."""
+    rise = SEAM + patches if patches else "rise = 1.0\nPRESSED\n"
+    with pytest.raises(FileError, match="rise is for a roof that a pressure lifts, and none is left here"):
+        given(HALL + rise.replace("PRESSED", "pressure = -1.0"))

@@ -80,3 +80,11 @@ def test_a_folder_made_for_nothing_goes_again(tmp_path):
     with pytest.raises(RuntimeError), folder(path):
         raise RuntimeError
     assert (path / "a.obj").exists()
+
+
+def test_a_name_as_long_as_a_file_system_takes_is_written(tmp_path):
+    """Before, the name on the way was longer than this."""
+    path = tmp_path / f"{'x' * 251}.obj"
+    with atomic_writes([path]) as (temporary,):
+        temporary.write_text("new", encoding="utf-8")
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]

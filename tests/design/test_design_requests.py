@@ -32,6 +32,7 @@ TARGET, PARAMETER = "a Target", "a Parameter or the name of a patch"
         (lambda: Target("height", "north"), {"what": "of", "found": "north"}),
         (lambda: Target("curvature"), {"what": "of", "found": None}),
         (lambda: Target("apex", 3), {"what": "of", "found": 3}),
+        (lambda: Target("area", at_most=9.0, name="roof"), {"what": "name", "found": "roof"}),
         (lambda: Target("apex", "a", 1.0, at_most=2.0), {"what": "value"}),
         (
             lambda: Target("apex", "a", at_least=3.0, at_most=2.0),

@@ -6,7 +6,9 @@ import http.client
 import json
 import re
 import threading
+from contextlib import closing
 from importlib.resources import files
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -20,6 +22,8 @@ from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.certificate import Verdict
 from pcmc.explore import server
 from pcmc.explore.listening import pack, unpack
+from pcmc.explore.roof import ShownRoof
+from pcmc.plan import Plan
 
 CAP = spherical_cap(edge_length=0.25)
 
@@ -127,6 +131,18 @@ def test_exports_are_the_surface_shown(client, suffix, tmp_path):
     assert np.isclose(read.vertices[:, 2].max(), shown.vertices[:, 2].max(), rtol=1e-6)
     if suffix != ".stl":
         assert [p.name for p in read.patches] == [p.name for p in shown.patches]
+
+
+def test_an_export_tells_what_its_format_loses(tmp_path):
+    """Before, a .stl of a roof in the coordinates of a survey was elsewhere without a word."""
+    corners = [[691000, 5334000], [691008, 5334000], [691008, 5334008], [691000, 5334008]]
+    roof = ShownRoof.of(pcmc.solve(Plan(corners, edge_length=2.0, tension=6.0).surface()).surface)
+    with closing(explore.start(roof)) as running:
+        client = Client(running)
+        place = f"/api/{client.ask('/api/open')[0]['session']}/export?suffix="
+        notes = [client.raw("GET", place + kind)[0].getheader("X-Note") for kind in (".obj", ".stl")]
+    assert notes[0] == ""
+    assert unquote(notes[1]).startswith("its coordinates are relative to [691004, 5334004, 0]")
 
 
 def test_the_least_recently_used_session_expires(client, monkeypatch):

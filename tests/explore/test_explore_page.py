@@ -154,7 +154,7 @@ def test_a_saddle_is_named_and_its_motion_shown(driver):
         assert not page.find("#stabilise").is_displayed()
 
 
-def test_the_export_downloads_the_surface(page, driver, explorer):
+def test_the_export_downloads_the_surface(page, driver, explorer, monkeypatch):
     page.enter("Tension α of right wall", 12)
     for suffix in (".obj", ".pcmc", ".png"):
         page.find("#export summary").send_keys("\n")
@@ -171,6 +171,10 @@ def test_the_export_downloads_the_surface(page, driver, explorer):
         assert [p.name for p in read.patches] == [p.name for p in shown.patches]
         np.testing.assert_allclose(read.vertices, shown.vertices, atol=1e-6 * shown.size)
     assert read.patches[4].tension == 12.0
+    monkeypatch.setattr(explorer, "export", lambda *_: ("hall.stl", b"solid", "a .stl file loses a plane Π"))
+    page.find("#export summary").send_keys("\n")
+    page.find("#export button[value='.stl']").send_keys("\n")
+    until(lambda: page.text("#note") == "A .stl file loses a plane Π", "the note")
     assert page.complaints() == []
 
 

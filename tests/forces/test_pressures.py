@@ -83,6 +83,21 @@ def test_far_from_the_plane_s_point_volumes_are_seen_from_near_by():
     assert far.moved(far.vertices + np.array([1e3, 0, 0])).origin is far.origin
 
 
+def test_shapes_on_one_boundary_are_seen_from_one_point_in_survey_coordinates():
+    """Over a rim that leans E has a part by that point, in which two shapes would differ."""
+    corners = np.array([[1, 1, 1.2], [-1, 1, 0.8], [-1, -1, 0.8], [1, -1, 1.2], [0, 0, 1.5]])
+    F, top, roof = (
+        [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
+        np.array([0, 0, 0, 0, 1.0]),
+        [Patch("roof", 1.0)],
+    )
+    steps = []
+    for shift in ([0.0, 0.0, 0.0], [5e3, 0.0, 0.0]):
+        low, high = (corners + shift + top[:, None] * d for d in ([0, 0, 0], [0.5, 0, 1.0]))
+        steps.append(np.ptp([energy(Surface(X, F, [0] * 4, roof, fixed=range(4))) for X in (low, high)]))
+    assert steps[1] == pytest.approx(steps[0], rel=1e-9)
+
+
 def test_energy_does_not_depend_on_the_order_of_planes_without_a_common_point():
     """Of three walls around a raised opening that leans; volumes were seen from where the first two meet."""
     corners, hole = (

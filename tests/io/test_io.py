@@ -15,6 +15,7 @@ import pcmc
 from pcmc.base.errors import FileError, FileWarning, LostWarning, MissingExtra, OptionError, SurfaceError
 from pcmc.base.units import Units
 from pcmc.io import FORMATS, load
+from pcmc.io.mesh_data import converted
 
 READ = [suffix for suffix, form in FORMATS.items() if form.reads]
 SINGLE = (".stl", ".glb", ".gltf")  # in single precision
@@ -42,7 +43,7 @@ def turned(face):
     "names", [("west side", "east", "wall"), ("Süd/Ost", "a.b", "κ_1 (2)"), ("a\\", "$x$", "ü" * 100)]
 )
 def test_round_trip(tmp_path, suffix, names):
-    surface = tent(names=names)
+    surface = tent(names=names, tilted=suffix not in NAMES_ONLY)
     path = tmp_path / f"roof one{suffix}"
     pcmc.write(path, surface)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
@@ -139,7 +140,7 @@ def test_parts_that_no_longer_fit_their_mesh_are_left_out_with_a_note(tmp_path, 
 @pytest.mark.parametrize("suffix", [s for s in FORMATS if s != ".3dm"])  # it has the time in it
 def test_same_surface_same_bytes(tmp_path, suffix):
     for name in ("a", "b"):
-        pcmc.write(tmp_path / f"{name}{suffix}", tent())
+        pcmc.write(tmp_path / f"{name}{suffix}", tent(tilted=suffix not in NAMES_ONLY))
     assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
 
 
@@ -148,7 +149,7 @@ def test_scalars_travel_or_are_said_to_be_lost(tmp_path, suffix):
     surface, path = tent(), tmp_path / f"a{suffix}"
     scalars = {"height": surface.vertices[:, 2], "mean_curvature": pcmc.mean_curvature(surface)}
     if suffix not in SCALARS:
-        too = ", supports, tensions, pressures" if suffix in NAMES_ONLY else ""
+        too = ", its plane Π, supports, tensions, pressures" if suffix in NAMES_ONLY else ""
         with pytest.warns(FileWarning, match=f"cannot carry height, mean_curvature{too}; left out"):
             pcmc.write(path, surface, scalars=scalars)
         assert not load(path).scalars
@@ -244,7 +245,7 @@ def test_what_the_caller_says_wins(tmp_path):
 @pytest.mark.parametrize("suffix", FORMATS)
 @pytest.mark.parametrize("part", [0.0, 0.02, 0.3, 0.6, 0.9, 0.99])
 def test_truncated_files_are_refused_in_one_line(tmp_path, suffix, part):
-    pcmc.write(tmp_path / f"a{suffix}", tent())
+    pcmc.write(tmp_path / f"a{suffix}", tent(tilted=suffix not in NAMES_ONLY))
     data = (tmp_path / f"a{suffix}").read_bytes()
     path = tmp_path / f"cut{suffix}"
     path.write_bytes(data[: int(part * len(data))])
@@ -314,7 +315,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
 )
 def test_missing_libraries_are_named(tmp_path, monkeypatch, suffix, name):
     path = tmp_path / f"a{suffix}"
-    pcmc.write(path, tent())
+    pcmc.write(path, tent(tilted=False))
     monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(MissingExtra, match=rf"{name} is not installed.*pcmc-surfaces\[files\]"):
         pcmc.read(path)
@@ -341,3 +342,14 @@ def test_damaged_native_files(tmp_path):
     with refused(FileError, where="metadata", found="{}"):
         pcmc.read(changed(description="{}"))
     assert pcmc.read(changed()).n == 10
+
+
+def test_findings_of_a_file_do_not_stay_in_another_unit(tmp_path):
+    """Before, a file in mm had areas, volume and curvature of the one in m."""
+    result = pcmc.solve(tent())
+    curvature = {"mean curvature": np.ones(result.surface.n)}
+    pcmc.write(tmp_path / "a.pcmc", result, scalars=curvature, units="m")
+    data = converted(load(tmp_path / "a.pcmc"), "mm")
+    assert set(data.certificate) == {"mark"}
+    assert data.scalars["mean curvature"] == pytest.approx(1e-3)
+    assert data.notes[1] == "its certificate is left out"

@@ -120,3 +120,35 @@ def test_tensions_in_another_unit_of_force_than_the_file_has_are_refused(tmp_pat
     report = ["report", str(tmp_path / "roof.pcmc"), "-o", str(tmp_path / "roof.pdf"), "--force", "N"]
     assert cli.main(report) == 2
     assert "--force: the forces of roof.pcmc are in kN, not in N" in capsys.readouterr().err
+
+
+FLAT = "v 0 0 0\nv 8000 0 0\nv 8000 8000 0\nv 0 8000 0\nv 4000 4000 10\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n"
+
+
+def test_another_unit_than_the_file_s_own_is_refused(tmp_path):
+    """Before, it counted for nothing."""
+    pcmc.write(tmp_path / "bay.pcmc", bay(6), units="m")
+    (tmp_path / "roof.toml").write_text('[mesh]\nfile = "bay.pcmc"\nunits = "mm"\n', encoding="utf-8")
+    with pytest.raises(OptionError, match=r"bay\.pcmc is in m itself, not in mm; leave units out"):
+        build(tmp_path / "roof.toml")
+
+
+def test_a_mesh_of_an_unlikely_size_is_noted(tmp_path):
+    (tmp_path / "flat.obj").write_text(FLAT, encoding="utf-8")
+    (tmp_path / "roof.toml").write_text('units = "m"\nmesh = "flat.obj"\n', encoding="utf-8")
+    note = r'the mesh is 8 km long; are its numbers in mm\? Then type units = "mm" in \[mesh\], or --units mm'
+    with pytest.warns(FileWarning, match="boundary is taken"), pytest.warns(FileWarning, match=note):
+        build(tmp_path / "roof.toml")
+
+
+@pytest.mark.parametrize("pressure", [-1.0, 0.0])
+def test_a_rise_needs_a_pressure_that_lifts_the_mesh(tmp_path, pressure):
+    """Before, a search ended with "a bound on the parameters is in the way", or met nothing."""
+    (tmp_path / "flat.obj").write_text(FLAT, encoding="utf-8")
+    text = f'[mesh]\nfile = "flat.obj"\nrise = 900\n[mesh.patches.flat]\npressure = {pressure}\n'
+    (tmp_path / "roof.toml").write_text(text, encoding="utf-8")
+    with (
+        pytest.warns(FileWarning, match="boundary is taken"),
+        pytest.raises(OptionError, match="rise is for a roof that a pressure lifts, and none does here"),
+    ):
+        build(tmp_path / "roof.toml")

@@ -85,6 +85,8 @@ def test_output_names_are_checked_before_any_work(tmp_path):
         check_outputs([tmp_path / "a.obj"])
     with pytest.raises(FileError, match="named twice"):
         check_outputs([tmp_path / "b.obj", tmp_path / "b.obj"])
+    with pytest.raises(FileError, match=r"B\.OBJ: is named twice, if capitals count as small letters"):
+        check_outputs([tmp_path / "b.obj", tmp_path / "B.OBJ"])
     with refused(FileError, what="b.obk", found=".obk"):
         check_names(["b.obk"])
     with pytest.raises(FileError, match=r"b.png: .*a picture has its own option"):
@@ -94,6 +96,14 @@ def test_output_names_are_checked_before_any_work(tmp_path):
     with pytest.raises(FileError, match="there is no folder"):
         check_outputs([tmp_path / "away" / "b.obj"])
     check_outputs([tmp_path / "away" / "b.obj"], tmp_path / "away")
+
+
+def test_a_file_that_is_read_only_is_not_replaced(tmp_path, monkeypatch):
+    """Before, it was: the folder alone was looked at."""
+    (tmp_path / "b.obj").write_text("kept", encoding="utf-8")
+    monkeypatch.setattr("os.access", lambda path, mode: path.is_dir())
+    with pytest.raises(FileError, match=r"b\.obj: is there and read-only; name another file"):
+        check_outputs([tmp_path / "b.obj"])
 
 
 def test_a_folder_that_may_not_be_written_to_is_refused_before_any_work(small, monkeypatch):

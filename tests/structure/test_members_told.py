@@ -19,6 +19,7 @@ from pcmc.report.chapters import under_load_chapter
 from pcmc.report.tables import Picture, Table
 from pcmc.structure import Member, Profile, analyse
 from pcmc.structure.member_forces import (
+    cable_notes,
     members_at_rest,
     sentences,
     weak_members,
@@ -66,6 +67,31 @@ def test_equal_beams_share_a_line():
     assert told[0].startswith("edge 0, edge 1: at rest N = ")
 
 
+@pytest.mark.parametrize("sizes", [(0.2, 0.2), (0.1, 0.2)])
+def test_a_beam_that_stands_needs_a_section_alike_all_round(sizes):
+    """The height of another one lay along an axis of space: it did not turn with the roof."""
+    flat = square(4, tension=2.0)
+    film = flat.moved(flat.vertices @ [[1.0, 0, 0], [0, 0, 1.0], [0, 0, 0]])
+    edge = Member(polyline([[0, 0, 0], [0, 0, 1]]), Profile.rectangle(*sizes), STEEL, name="edge")
+    if sizes[0] == sizes[1]:
+        assert len(model_of(film, members=[edge], anyway=True).lines) == 1
+        return
+    with refused(OptionError, what="members", where="edge") as caught:
+        model_of(film, members=[edge], anyway=True)
+    assert "stands upright" in str(caught.value)
+
+
+def test_beams_and_columns_of_one_name_have_numbers():
+    """Tables had several under one name, and a file the force of the last one on all of them."""
+    film, steel = square(8, tension=2.0), (TUBE, STEEL)
+    ends = [
+        Member(polyline(line), *steel, name="edge") for line in ([[0, 0], [1, 0]], [[0, 0.25], [0, 0.75]])
+    ]
+    column = Member([[0, 0], [0, 0, -1]], *steel, name="edge")
+    model = model_of(film, members=[*ends, column], anyway=True)
+    assert [line.name for line in (*model.lines, *model.bars)] == ["edge-1", "edge-2", "edge-3"]
+
+
 @pytest.mark.parametrize("profile", [TUBE, Profile(5.38e-3, 8.36e-5, 6.04e-6)], ids=["tube", "I"])
 def test_the_torsion_constant_of_a_section_without_a_shape_is_told(profile):
     """4 I I'/(I + I') = 2.25e-5 m⁴; that of an IPE 300 is 2.0e-7: a bow twists a hundred times as much."""
@@ -85,6 +111,18 @@ def test_the_diagram_of_a_ring_comes_back_to_where_it_begins(monkeypatch):
         s, force = axes.lines[1].get_data()
         assert (s[0], s[-1]) == pytest.approx((0.0, around))
         assert force[0] == force[-1]
+
+
+def test_a_beam_on_a_cable_is_told_to_be_a_rope():
+    """A cable does not bend; without a word the beam had its area alone."""
+    beam, rope = (
+        model_of(square(cable=3.0), members=[Member("tie", TUBE, STEEL, kind)], anyway=True)
+        for kind in ("beam", "cable")
+    )
+    assert cable_notes(rope) == []
+    assert cable_notes(beam) == [
+        'the members on the cables "tie" count as their sections: cables do not bend'
+    ]
 
 
 def test_a_member_that_cannot_be_is_refused_in_a_line():
@@ -114,6 +152,8 @@ def test_a_member_that_cannot_be_is_refused_in_a_line():
         StructuralModel(hall(), FABRIC, 1e-3, members=[Member("wall 1", TUBE, STEEL)] * 2)
     with refused(OptionError, what="members"):
         StructuralModel(hall(), FABRIC, 1e-3, members=["wall 1"])
+    with refused(OptionError, what="members", where="tie"):  # the last one counted
+        model_of(square(cable=3.0), members=[Member("tie", TUBE, STEEL, "cable")] * 2, anyway=True)
     crossing = [[[4, 0], [4, 4]], [[0, 2], [8, 2]]]
     bays = Plan([[0, 0], [8, 0], [8, 4], [0, 4]], crossing, edge_length=0.8, tension=2.0).surface()
     with refused(OptionError, what="members", where="wall 1"):

@@ -29,6 +29,7 @@ from pcmc.project import Structure
         ({"loads": Snow(1.0)}, "loads"),
         ({"loads": [1.0]}, "loads"),
         ({"loads": [()]}, "loads"),
+        ({"loads": [SelfWeight(), SelfWeight(5.0, "moon")]}, "loads"),
         ({"material": Material(1.0), "loads": [SelfWeight()]}, "Material.density"),
         ({"cable_material": 1}, "cable_material"),
     ],
@@ -57,6 +58,8 @@ def test_bad_models_are_refused(given, what):
         (partial(Wind, {"roof": "1"}), "Wind.pressures"),
         (partial(Structure, thickness=1.0), "young"),
         (partial(Structure, young=1.0), "thickness"),
+        (partial(Structure, 1.0, 1.0, zones=[{"case": "form pressure", "snow": 1.0}]), "loads"),
+        (partial(Structure, 1.0, 1.0, combinations={"form pressure": {"form": 1.0}}), "combinations"),
     ],
 )
 def test_bad_materials_and_loads_are_refused(make, what):

@@ -26,7 +26,7 @@ from studies.folder import Folder, mesh_hash
 from studies.paper import read_measured
 from studies.registry import STUDIES, chosen
 from studies.runner import OFF, THREADS, environment, run_all
-from studies.study import perform
+from studies.study import SOURCES, git, perform
 from studies.worker import main as work
 from tests.studies.tiny_study import tiny_study
 
@@ -105,6 +105,12 @@ def test_missing_file_says_which_study_writes_it(tmp_path):
 
 
 # ------------------------------------------------------------------------------------ steps
+
+
+def test_changes_of_the_package_count_as_uncommitted_too():
+    """Only those of studies/ did, where git is asked."""
+    known = git("ls-files", "--full-name", "--", *SOURCES).splitlines()
+    assert {"pcmc/__init__.py", "generators/__init__.py", "studies/study.py"} <= {*known} or not known
 
 
 def test_steps_are_taken_in_order_and_the_provenance_is_apart_from_the_numbers(tmp_path):

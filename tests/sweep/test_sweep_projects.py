@@ -239,6 +239,7 @@ def test_the_digest_is_of_what_the_file_says(roof, tmp_path):
     assert len({digest(tmp_path / f"{name}.pcmc") for name in "abcd"}) == 4
 
 
+CORNER = "supports = [[[0, 0], [6, 0]]]"
 BAD = [
     ("wst.tension", 2.0, "unknown number 'wst.tension'; did you mean 'west.tension'"),
     ("west.tensoin", 2.0, "did you mean 'west.tension'"),
@@ -270,9 +271,29 @@ def test_two_names_of_one_number_are_refused(roof):
     """The second one was in the table, and counted for nothing."""
     names = {"west.tension": "plan.patches.west.tension", "wall 1.tension": "plan.dividers.1.wall"}
     for name, other in names.items():
-        with pytest.raises(PcmcError, match=f"{name} and {other} are one number; give one of them"):
+        with pytest.raises(PcmcError, match=f"{name} and {other} set the same number; give one of them"):
             project_sweep(roof, {name: [4.0], other: [5.0, 6.0]})
     assert len(project_sweep(roof, {"west.tension": [4.0], "plan.patches.east.tension": [5.0]})) == 1
+
+
+@pytest.mark.parametrize(
+    ("lines", "name", "other"),
+    [
+        ("tension = 5.0", "patch 1.tension", "plan.tension"),
+        ("tension = 5.0\ncushion = 1.0", "patch 1.pressure", "plan.pressure"),
+        (
+            f"tension = 5.0\npressure = 0.0\nedge = 'cable'\ncable = 9\n{CORNER}",
+            "cable 1.tension",
+            "plan.cable",
+        ),
+    ],
+)
+def test_a_number_of_all_and_that_of_the_only_one_are_one(tmp_path, lines, name, other):
+    """Before, the first one was in the table, and counted for nothing."""
+    path = tmp_path / "roof.toml"
+    path.write_text(f"[plan]\nedge_length = 1.5\noutline = [[0, 0], [6, 0], [6, 4], [0, 4]]\n{lines}\n")
+    with pytest.raises(PcmcError, match=f"{name} and {other} set the same number; give one of them"):
+        project_sweep(path, {name: [4.0], other: [5.0, 6.0]})
 
 
 def test_a_name_that_is_none_is_refused_by_a_case_too(roof):

@@ -1,6 +1,6 @@
 // The page: it sends one request at a time to the server and shows the answers.
 
-import { choice, digits, element, find } from "./elements.js";
+import { capital, choice, digits, element, find } from "./elements.js";
 import { addSaving, follow } from "./file.js";
 import {
   arrowsOf, COLOURS, fieldOf, showFindings, showLegend, showParts, showSupports, showVerdict,
@@ -330,12 +330,14 @@ class Page {
     find("#export").open = false;
     find("#export summary").focus(); // the button that had it is gone
     try {
-      const body = suffix === ".png"
-        ? await this.viewer.picture() : await fetchFile(`api/${this.name}/export?suffix=${suffix}`);
+      const [body, note] = suffix === ".png"
+        ? [await this.viewer.picture(), ""] : await fetchFile(`api/${this.name}/export?suffix=${suffix}`);
       const link = element("a", { href: URL.createObjectURL(body), download: `${this.download}${suffix}` });
       link.click();
       setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-      if (!this.header.at_rest) this.notify("Saved: the surface shown, with its own values, not those you asked for.");
+      const other = "Saved: the surface shown, with its own values, not those you asked for. ";
+      const words = (this.header.at_rest ? "" : other) + capital(note);
+      if (words) this.notify(words);
     } catch (error) {
       this.notify(error.message);
     }

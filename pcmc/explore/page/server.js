@@ -37,5 +37,8 @@ let turns = 0;
 /** As `ask`, for acts: the server does them in the order in which they were sent, on whichever connections. */
 export const askInTurn = (path, body) => ask(path, body, { "X-Turn": `${page} ${turns++}` });
 
-/** GET a file; returns its body. */
-export const fetchFile = async (path) => (await request(path)).blob();
+/** GET a file; returns its body, and a note about it. */
+export async function fetchFile(path) {
+  const response = await request(path);
+  return [await response.blob(), decodeURIComponent(response.headers.get("X-Note"))];
+}

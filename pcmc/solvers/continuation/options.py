@@ -34,7 +34,8 @@ class FollowOptions:
     control : the quantity that each step prescribes: ``"arclength"``; ``"volume"`` or ``"height"`` of
         the highest vertex, which end where it turns; ``"parameter"``, which ends at a fold.
     step : length of the first step. If it is negative, the branch starts towards smaller λ. A relative
-        change of λ by 1 has length 1; so has a mean displacement by the surface's size.
+        change of λ by 1 has length 1; so has a mean displacement by the surface's size. Loads that are 0
+        change relative to the largest pressure or, without one, tension over size.
     smallest, largest : shortest and longest step.
     steps : largest number of steps.
     tolerance : relative residual of each point.

@@ -104,7 +104,7 @@ class Direction:
             if not self.relative:
                 # not only to rounding: so a value of λ that is asked for gives exactly the values named
                 start[kind][[part_index(surface, kind, name) for name in self.named[kind]]] = 0.0
-        line = ParameterLine(value, start, rates)
+        line = ParameterLine(value, start, rates, {kind: usual_size(surface, kind) for kind in rates})
         refuse_varied_pressure(surface, np.flatnonzero(rates.get("pressures", ())))
         why = {"tensions": "{!r} is 0, where its triangles stop pulling", "cables": "the cable {!r} is 0"}
         for kind in [kind for kind in why if kind in rates]:  # from 0 on they would slide for nothing
@@ -133,24 +133,33 @@ class Direction:
         return float(value)
 
 
+def usual_size(surface: Surface, kind: str) -> float:
+    """The size of the loads of one kind where all are 0: the largest pressure, or tension over size."""
+    usual = float(np.abs(surface.pressures).max()) or float(surface.tensions.max()) / surface.size
+    return usual * surface.size if kind == "cable_weights" else usual
+
+
 @dataclass(frozen=True, eq=False)
 class ParameterLine:
     """The values of a surface as functions of λ: a ``Direction`` with its start.
 
     ``value`` is λ of that surface; ``start`` and ``rates`` are the values at λ = 0 and their rates, by the
-    kinds that vary.
+    kinds that vary; ``usual`` their sizes where all are 0.
     """
 
     value: float
     start: Rates
     rates: Rates
+    usual: Mapping[str, float]
 
     @cached_property
     def scale(self) -> float:
-        """The size of λ in the metric of arclength: what varies over its rates."""
-        size = np.linalg.norm(np.concatenate(list(self._varied(self.value).values())))
+        """The size of λ in the metric of arclength: what varies, or its usual size, over its rates."""
+        varied = self._varied(self.value)
+        size = np.linalg.norm(np.concatenate(list(varied.values())))
+        usual = np.linalg.norm([self.usual[kind] for kind, values in varied.items() for _ in values])
         rates = np.concatenate([rates[rates != 0.0] for rates in self.rates.values()])
-        return float(size / np.linalg.norm(rates)) or 1.0
+        return float((size or usual) / np.linalg.norm(rates))
 
     def _varied(self, value: float) -> dict[str, Floats]:
         """The values that vary, at λ."""
@@ -244,7 +253,7 @@ class BoundaryMotion:
             message = f"BoundaryMotion: room {name!r} prescribes a volume, which is not followed as the"
             message += " boundary moves; remove the room, and give its pressure"
             raise OptionError(message, what="parameter", found=name)
-        line = BoundaryLine(self.start, {}, {}, self.positions, int(surface.pinned.sum()))
+        line = BoundaryLine(self.start, {}, {}, {}, self.positions, int(surface.pinned.sum()))
         off = np.linalg.norm(line.boundary(self.start) - surface.vertices[surface.pinned], axis=1)
         if off.max() > ON * surface.size:
             worst = int(np.flatnonzero(surface.pinned)[off.argmax()])
