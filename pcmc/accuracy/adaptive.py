@@ -197,6 +197,9 @@ def accuracies(given: Any) -> dict[str, float]:
     wanted: dict[Any, Any] = dict(given) if isinstance(given, Mapping) else {}
     for part in given.split(",") if isinstance(given, str) else ():
         name, sign, value = part.rpartition("=")
+        if name.strip() in wanted:
+            text = f"accuracy: {name.strip()} is given twice; keep one"
+            raise OptionError(text, what="accuracy", found=name.strip())
         try:
             wanted[name.strip()] = validate.parsed(value)
         except ValueError:

@@ -21,6 +21,7 @@ from ..base.arrays import Floats
 from ..base.errors import MissingExtra, SurfaceError
 from ..base.tolerances import COLLAPSED
 from ..forces.functional import energy_at, patch_areas
+from ..forces.loose_parts import part_size
 from ..forces.pinching import standing_part
 from ..meshing.quality import worst_quality
 from ..meshing.remeshing import remesh
@@ -101,10 +102,9 @@ def _repulsion(shape: Shape, known: Sequence[Shape], size: float) -> float:
 def way_down(saddle: Surface, mode: Floats) -> tuple[Surface, Status]:
     """The end of the way down from a saddle along a mode (n,3), with its sign; CONVERGED at a minimum."""
     state = SolverState(saddle, 0.0)
-    unit = mode * (FIRST * saddle.size / np.linalg.norm(mode, axis=1).max())
+    unit = mode * (FIRST * part_size(saddle) / np.linalg.norm(mode, axis=1).max())
     for t in 0.5 ** np.arange(HALVINGS):
-        X, _ = state.displaced(t * unit)
-        X = state.keep_volumes(X)
+        X = state.keep_volumes(state.displaced(t * unit)[0])
         if state.energy_at(X) < state.energy and not state.spoils_triangles(X):
             run = NewtonRun(state.result_surface(X), NewtonOptions(), Log(None), 0, smooth_steps=SMOOTH).run()
             return run.state.result_surface(), run.status

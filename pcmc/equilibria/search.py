@@ -17,6 +17,7 @@ from ..base.interrupts import stop_requested
 from ..base.tolerances import AT_REST
 from ..certificate import certify
 from ..certificate.verdict import only_coarse
+from ..forces.loose_parts import part_size
 from ..forces.pinching import standing_part
 from ..solvers import solve
 from ..solvers.continuation import BoundaryMotion, Branch, Direction
@@ -328,9 +329,8 @@ class _Search:
 
     def deflate(self, number: int) -> None:
         """Deflated Newton from starts around an equilibrium."""
-        one, size = self.found[number], self.surface.size
-        random = np.random.default_rng([self.options.seed, number])
-        modes = one.certificate.modes
+        one, random = self.found[number], np.random.default_rng([self.options.seed, number])
+        modes, size = one.certificate.modes, part_size(self.surface)
         unit = modes / np.linalg.norm(modes, axis=2).max(axis=1)[:, None, None]
         for _ in range(self.options.starts if len(modes) else 0):
             self.tell(f"deflated Newton around equilibrium {number + 1}")

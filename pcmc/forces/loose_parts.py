@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Floats, Ints
 from ..surface import Surface
-from ..surface.geometry import squared_sides
+from ..surface.geometry import bounding_size, squared_sides
 from ..surface.topology import SHEET, Topology, components
 from .motion_space import VertexClasses, force_scale, squared_forces
 
@@ -42,6 +42,18 @@ def rounding_left(surface: Surface, classes: VertexClasses, X: Floats) -> float:
     edges = np.sqrt(squares[counts > 0] / (3.0 * counts[counts > 0]))
     shortest = edges[edges > 0.0].min(initial=np.inf)
     return float(np.finfo(float).eps * np.abs(X).max(initial=0.0) / shortest)
+
+
+def part_size(surface: Surface) -> float:
+    """The diagonal of the largest connected part's bounding box, length; how far parts are apart is no size.
+
+    >>> from pcmc import Patch
+    >>> X = [[0, 0, 0], [3, 0, 0], [0, 4, 0], [90, 0, 0], [91, 0, 0], [90, 1, 0]]
+    >>> part_size(Surface(X, [[0, 1, 2], [3, 4, 5]], [0, 0], [Patch("a", 1.0)], fixed=range(6)))
+    5.0
+    """
+    parts = surface.topology.components
+    return max(bounding_size(surface.vertices[parts == k]) for k in np.unique(parts))
 
 
 def patch_residuals(surface: Surface, classes: VertexClasses, left: Floats) -> Floats:

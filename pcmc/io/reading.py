@@ -17,7 +17,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
-from ..base.errors import FileError, FileWarning, MissingExtra, PcmcError, SurfaceError
+from ..base.errors import FileError, FileWarning, MissingExtra, OptionError, PcmcError, SurfaceError
 from ..base.files import as_path, check_regular, system_error
 from ..base.libraries import unreadable
 from ..base.units import MICROMETRES, Units
@@ -91,7 +91,8 @@ def read(
 def read_bare(path: str | os.PathLike[str], units: str = "", assumed: str = "") -> tuple[Surface, MeshData]:
     """The Surface in a file and all its data; a note if it lacks supports, tensions or a unit.
 
-    ``units`` is the unit of length wanted, by default the file's own; ``assumed`` that of a file without one.
+    ``units`` is the unit of length wanted, by default the file's own; ``assumed`` that of a file without one;
+    OptionError for a file that has another.
 
     >>> import tempfile
     >>> from pcmc import Patch, write
@@ -102,7 +103,11 @@ def read_bare(path: str | os.PathLike[str], units: str = "", assumed: str = "") 
     >>> surface.patches, data.units.length
     ((Patch(name='film', tension=2.0, pressure=1.0),), 'm')
     """
-    data = converted(load(path), units, assumed or units)
+    data = load(path)
+    if assumed and data.units.length not in ("", assumed):
+        text = f"units: {os.fspath(path)} is in {data.units.length} itself, not in {assumed}; leave units out"
+        raise OptionError(text, what="units", found=assumed, expected=data.units.length)
+    data = converted(data, units, assumed or units)
     return _surface(path, data, ()), data
 
 

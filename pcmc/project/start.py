@@ -97,6 +97,9 @@ def read_mesh(path: Path, mesh: MeshFile, units: Units = NO_UNITS) -> tuple[Surf
     values: dict[str, dict[str, float]] = {kind: {} for kind in ("tensions", "pressures", "weights", "snows")}
     if mesh.tension is not None:
         loaded = {p.name for p in surface.patches if not p.auxiliary} - {*sheets_below(surface).values()}
+        if all("tension" in mesh.patches.get(name, ()) for name in loaded):
+            text = "mesh.tension: no patch under pressure is without its own in mesh.patches; leave it out"
+            raise OptionError(text, what="mesh.tension", found=mesh.tension)
         values["tensions"] |= dict.fromkeys(loaded, mesh.tension)
     for name, own in mesh.patches.items():
         patch = surface.patches[surface.patch_index(name)]  # refuses one that is not there

@@ -243,6 +243,7 @@ def test_explore_serves_a_file_and_an_example(solved, monkeypatch):
         (["solve", "roof.toml", "--tension", "1", "--tension", "2"], "a bare value is given twice"),
         (["report", "roof.toml", "-o", "a.pdf", "--output=b.pdf"], "--output is given twice; keep one"),
         (["certify", "roof.toml", "--cache", "--no-cache"], "--cache is given twice; keep one"),
+        (["solve", "roof.toml", "--accuracy", "height=1", "--accuracy", "height=2"], "height is given twice"),
         (["solve", "roof.toml", "--accuracy-of", "limit"], "accuracy_of: counts only with an accuracy"),
         (["solve", "roof.toml", "--most-triangles", "9"], "most_triangles: counts only with an accuracy"),
         (

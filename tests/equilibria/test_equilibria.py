@@ -128,7 +128,7 @@ def test_two_caps_under_one_gas_are_a_double_well():
     assert [one.index for one in found.found] == [0, 0, 1]
     for one, other in ((1, 2), (2, 1)):
         exact = areas[:2].sum() - areas[2:].sum()
-        assert found.barrier(one, other) == pytest.approx(exact, rel=0.1)
+        assert found.barrier(one, other) == pytest.approx(exact, rel=0.12)
     assert not found.failed  # both branches reach their minimum, also where a start has found it before
 
 

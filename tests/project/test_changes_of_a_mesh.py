@@ -125,6 +125,14 @@ def test_tensions_in_another_unit_of_force_than_the_file_has_are_refused(tmp_pat
 FLAT = "v 0 0 0\nv 8000 0 0\nv 8000 8000 0\nv 0 8000 0\nv 4000 4000 10\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n"
 
 
+def test_another_unit_than_the_file_s_own_is_refused(tmp_path):
+    """Before, it counted for nothing."""
+    pcmc.write(tmp_path / "bay.pcmc", bay(6), units="m")
+    (tmp_path / "roof.toml").write_text('[mesh]\nfile = "bay.pcmc"\nunits = "mm"\n', encoding="utf-8")
+    with pytest.raises(OptionError, match=r"bay\.pcmc is in m itself, not in mm; leave units out"):
+        build(tmp_path / "roof.toml")
+
+
 def test_a_mesh_of_an_unlikely_size_is_noted(tmp_path):
     (tmp_path / "flat.obj").write_text(FLAT, encoding="utf-8")
     (tmp_path / "roof.toml").write_text('units = "m"\nmesh = "flat.obj"\n', encoding="utf-8")

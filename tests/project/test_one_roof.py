@@ -268,6 +268,7 @@ def test_supports_of_a_mesh_are_points_and_lines(mesh):
         ("patches = {rof = {tension = 1}}", "patch"),
         ("tension = -1", "mesh.tension"),
         ("rise = 0.8\npatches = {roof = {tension = 7.0}}", "mesh.patches"),
+        ("tension = 2.0\npatches = {roof = {tension = 7.0}}", "mesh.tension"),
     ],
 )
 def test_bad_values_of_a_mesh_are_refused_in_one_line(mesh, line, what):

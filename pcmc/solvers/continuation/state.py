@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ...base.arrays import Bools, Floats
-from ...forces.loose_parts import rounding_left
+from ...forces.loose_parts import part_size, rounding_left
 from ...forces.motion_space import MotionSpace
 from ...forces.pinching import part_by_positions, standing_part
 from ...forces.rooms import with_room_pressures
@@ -36,7 +36,7 @@ class BranchMesh:
     def __init__(
         self, surface: Surface, line: ParameterLine, backend: str | None = None, held: bool = False
     ) -> None:
-        self.line, self.size, self._backend = line, surface.size, backend
+        self.line, self.size, self._backend = line, part_size(surface), backend
         self.part = part = part_by_positions(surface, held) if held else standing_part(surface)
         self.surface = part.surface
         self.rounding = rounding_left(self.surface, part.classes, self.surface.vertices)  # of the residual
@@ -44,7 +44,7 @@ class BranchMesh:
         self._curves_move = bool(((part.classes.kind != SHEET) & ~self.surface.fixed).any())
         self._extension: HarmonicExtension | None = None
         self._inside: HarmonicExtension | None = None
-        least = LEAST_VOLUME * surface.size**3
+        least = LEAST_VOLUME * self.size**3
         self.last = Equilibrium(part, self.surface.vertices, backend, least)  # that asked for last
 
     def motion(self, space: MotionSpace, X: Floats, s: Floats) -> Floats:

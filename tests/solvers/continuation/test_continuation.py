@@ -8,7 +8,7 @@ from shapes import pyramid
 from tables import same
 
 from generators import spherical_cap, two_caps
-from pcmc import Direction, Parameter, certify, follow, solve
+from pcmc import Direction, Parameter, Patch, Surface, certify, follow, solve
 from pcmc.base.errors import OptionError
 from pcmc.plot import diagram
 from pcmc.solvers.continuation import Ending
@@ -129,6 +129,18 @@ def test_a_load_that_is_0_at_the_start_has_steps_of_one_length_in_all_units(smal
     one, two = (follow(s, loads, 0.5 * p).points for s, p in ((small_cap, 1.0), (newtons, 1e3)))
     assert two.parameter.to_numpy() == pytest.approx(1e3 * one.parameter, rel=1e-9)
     assert two.height.to_numpy() == pytest.approx(one.height, rel=1e-8)
+
+
+def test_how_far_parts_are_apart_does_not_change_a_branch(small_cap):
+    """Once steps were measured by the box around all: at 400 the branch was lost at its fold."""
+    X, F = small_cap.vertices, [*small_cap.faces, *(small_cap.faces + small_cap.n)]
+    loads, folds = Direction({"one": 1.0, "other": 1.0}), []
+    for apart in (4.0, 400.0):
+        both, owner = np.concatenate([X, np.add(X, [apart, 0.0, 0.0])]), np.repeat([0, 1], small_cap.m)
+        patches = [Patch("one", 0.6), Patch("other", 0.6)]
+        pair = Surface(both, F, owner, patches, fixed=np.tile(small_cap.fixed, 2))
+        folds.append(follow(pair, loads, step=-0.05, folds=1).folds.parameter[0])
+    assert folds[1] == pytest.approx(folds[0], rel=1e-7)
 
 
 def test_same_branch_twice_gives_the_same_tables(small_cap):
