@@ -257,5 +257,5 @@ def test_a_point_in_a_mirror_is_inside_the_whole_roof():
 def test_the_end_of_a_mirror_is_a_point_of_the_rim(unit):
     """In m a sail on such points got the note of a mast inside, in mm it did not."""
     outline = unit * np.array([[0, 0], [5, 0], [5, 8], [0, 8]])
-    mirrors, lines = [outline[1:3]], {"edge": "cable", "cable": 9.0, "edge_length": 0.6 * unit}
-    assert not point_masts(Plan(outline, supports=outline, mirrors=mirrors, tension=1.0, pressure=0.0, **lines))
+    sail = {"edge": "cable", "cable": 9.0, "tension": 1.0, "pressure": 0.0, "edge_length": 0.6 * unit}
+    assert not point_masts(Plan(outline, supports=outline, mirrors=[outline[1:3]], **sail))
