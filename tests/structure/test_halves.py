@@ -19,6 +19,7 @@ from pcmc.drawings.views import model_curves
 from pcmc.plan import Plan
 from pcmc.project.members import warn_of_members
 from pcmc.report.tables import cable_tables
+from pcmc.report.words import verdict_sentences
 from pcmc.structure import analyse
 from pcmc.structure.section import Structure
 
@@ -97,6 +98,14 @@ def test_a_cable_in_a_mirror_is_in_balance_as_in_the_whole():
     half, whole = (pcmc.certify(surface) for surface in halves())
     columns = ["sheet_pull", "cable_pull"]
     assert 2.0 * half.cables[columns].to_numpy() == pytest.approx(whole.cables[columns].to_numpy(), rel=1e-6)
+
+
+def test_a_part_says_that_a_cable_has_half_of_its_force():
+    """Sheets and files had 3 kN for a cable of 6 kN without a word."""
+    half, whole = (pcmc.certify(surface) for surface in halves())
+    assert half.part.endswith("behind its mirror planes and has half of the force of 'ridge'")
+    assert not whole.part
+    assert any(half.part in sentence for sentence in verdict_sentences(half))
 
 
 def test_a_mirror_holds_no_end_of_a_cable():
