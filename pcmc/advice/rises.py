@@ -235,7 +235,7 @@ def point_masts(plan: Plan) -> list[Mast]:
         in_mirror |= mirror.nearest(points[:, :2])[1] <= snap
     others = [line.nearest(points[:, :2])[1] for line in lines]
     away = np.min([shapely.distance(rim, places), *others], axis=0)
-    inside = within & (away > snap)
+    inside = within & (away > 2.0 * snap)  # the end of a mirror is one snap from the rest of the rim
     if len(points) > 1:
         near, _ = cKDTree(points[:, :2]).query(points[:, :2], k=[2])
         away = np.minimum(away, np.ravel(near))

@@ -149,7 +149,7 @@ class Certificate:
     @property
     def part(self) -> str:
         """Which part of a roof with mirror planes this is; empty for a whole roof."""
-        return part_of_roof(self.acting.surface.on_planes)
+        return part_of_roof(self.acting.surface)
 
     @cached_property
     def leaning(self) -> pd.DataFrame:

@@ -26,7 +26,8 @@ def report(outcome: Outcome, *, verdict: bool = True) -> None:
     if verdict and detail:
         message = message.removesuffix(f"; {detail}")  # it follows the verdict
     before = "solved before (--no-cache solves it again)"
-    print(f"{outcome.surface.m} triangles; {before if outcome.cached else message}")
+    extent = f", {certificate.part}" if certificate.part else ""
+    print(f"{outcome.surface.m} triangles{extent}; {before if outcome.cached else message}")
     if outcome.accurate is not None:
         print(outcome.accurate.text(units))
     if outcome.design is not None:

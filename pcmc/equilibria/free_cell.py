@@ -24,8 +24,10 @@ from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import AT_REST
 from ..certificate import Certificate
 from ..forces.functional import patch_areas
+from ..forces.pinching import standing_part
 from ..forces.rooms import room_pressures, room_volumes
 from ..solvers import solve
+from ..stability.equilibrium import Equilibrium
 from ..surface import Surface, expect_surface
 from ..surface.geometry import area_vectors
 from ..surface.images import lattice_of
@@ -70,8 +72,8 @@ def cell_stress(surface: Surface) -> Floats:
 
     Raises
     ------
-    SurfaceError : the surface is not periodic in three directions, is held or heavy, or has a pressure that
-        is not that of a room.
+    SurfaceError : the surface is not at rest, not periodic in three directions, is held or heavy, or has a
+        pressure that is not that of a room.
 
     >>> from pcmc import Patch, Surface, images_in
     >>> u, v = np.indices((4, 4)).reshape(2, 16) / 3.0
@@ -87,13 +89,13 @@ def cell_stress(surface: Surface) -> Floats:
     [[4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]]
     """
     _expect_free(surface, "cell_stress")
+    if (left := Equilibrium(standing_part(surface), surface.vertices).residual) > AT_REST:
+        raise SurfaceError(f"cell_stress: not at rest (residual {left:.1e}); solve it first", what="surface")
     pulls = area_vectors(surface.vertices[surface.faces])
     area = np.linalg.norm(pulls, axis=1)
     tension = surface.tensions[surface.patch_of_face]
-    total = (tension * area).sum() * np.eye(3)
-    total -= np.einsum("f,fi,fj->ij", tension / area, pulls, pulls)
-    if surface.rooms:
-        total -= float(room_pressures(surface) @ room_volumes(surface)) * np.eye(3)
+    all_around = (tension * area).sum() - room_pressures(surface) @ room_volumes(surface)
+    total = all_around * np.eye(3) - np.einsum("f,fi,fj->ij", tension / area, pulls, pulls)
     return np.asarray(total / _volume(surface))
 
 
@@ -127,8 +129,7 @@ def free_cell(
         stress = cell_stress(at) + (given or 0.0) * np.eye(3)
         return np.einsum("kij,ij->k", basis, stress) * _volume(at) / float(at.tensions @ patch_areas(at))
 
-    (at, certificate), solves, stretch = _at_rest(surface), 1, np.eye(3)
-    first = _volume(at)
+    (at, certificate), first, solves, stretch = _at_rest(surface), _volume(surface), 1, np.eye(3)
     for _ in range(STEPS):
         g = left(at)
         probes = [left(_at_rest(at, expm(PROBE * each))[0]) for each in basis]
@@ -203,8 +204,7 @@ def _expect_free(surface: Surface, what: str) -> None:
         which = "is held" if surface.held.any() else "has a weight"
         raise SurfaceError(f"{what}: for a surface without supports and weights; this one {which}")
     pressures = surface.net_pressures
-    of_rooms = room_pressures(surface) @ surface.room_signs if surface.rooms else 0.0 * pressures
-    other = np.abs(pressures - of_rooms)
+    other = np.abs(pressures - room_pressures(surface) @ surface.room_signs)
     if other.max() > AT_REST * max(np.abs(pressures).max(), surface.tensions.max() / surface.size):
         name = surface.patches[int(other.argmax())].name
         text = f"{what}: patch {name!r} has a given pressure, whose volume in a cell is known up to a"

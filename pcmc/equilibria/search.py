@@ -143,10 +143,8 @@ def find_equilibria(
     chosen = validate.options_from(SearchOptions, "find_equilibria", options)
     every = [along] if isinstance(along, Along) else validate.sequence("along", along)
     lines = [TracedParameter.of(given, what, chosen.span) for what in every]
-    names = [line.name for line in lines]
-    lines = [
-        replace(x, name=f"{x.name} {k}") if names.count(x.name) > 1 else x for k, x in enumerate(lines, 1)
-    ]
+    own = [x.name for x in lines]
+    lines = [replace(x, name=f"{x.name} {k}") if own.count(x.name) > 1 else x for k, x in enumerate(lines, 1)]
     search = _Search(given, lines, chosen, callback)
     try:
         search.run()

@@ -129,7 +129,7 @@ def write(
         findings = {name: getattr(certificate, name) for name in findings.FILED}
     if findings or (mark and form.certificate):
         findings = {**findings, "mark": mark}
-    mark = ", ".join(filter(None, (part_of_roof(surface.on_planes), mark)))
+    mark = ", ".join(filter(None, (part_of_roof(surface), mark)))
     about = metadata, carried, colour, findings, walls, units, bare, members, cable_areas or {}, mark
     for name in carried:
         if re.sub(r"\s+", "_", name) in form.reserved:

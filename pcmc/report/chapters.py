@@ -133,8 +133,9 @@ def cutting_chapter(pattern: CuttingPattern, units: Units) -> Iterator[Block]:
     sheet = seam_sheet(pattern, FORMAT, units.length)
     yield Heading(f"Cutting pattern, scale {sheet.scale}, lengths in {units.length}", new_page=True)
     yield on_paper(sheet.scale, *sheet.drawn())
-    area, long = one(float(table["cut_area"].sum())), one(float(sewn["length"].sum()))
-    yield f"{len(table)} strips, together {area} {units.area}; {long} {units.length} of seams between them."
+    area, cut = (f"{one(float(table[of].sum()))} {units.area}" for of in ("area", "cut_area"))
+    seams = f"{one(float(sewn['length'].sum()))} {units.length} of seams"
+    yield f"{len(table)} strips, together {area} on the roof, {cut} cut; {seams} between them."
     yield ABOUT_CLOTH
     yield Picture("Strain of the cloth", png(strains(pattern, width=PIXELS)))
     heads = {"strain_min": "strain_from", "strain_max": "to", "strain_rms": "mean"}

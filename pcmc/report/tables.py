@@ -123,7 +123,10 @@ def cable_tables(certificate: Certificate, units: Units) -> Iterator[Table]:
         columns = columns_in(table, {"force": force, **weights, f"length {MIDDLE}": units.length})
         yield text_table("Cables", table[["cable"]], columns)
     if len(table := certificate.cable_ends):
-        words = {"cable": table["cable"], "end": ["held" if held else "free" for held in table["held"]]}
+        surface, free = certificate.acting.standing, ~table["held"]
+        mirrored = free & surface.held[table["vertex"]]  # it goes on behind a mirror plane
+        kinds = np.select([mirrored, free], ["mirror", "free"], "held").tolist()
+        words = {"cable": table["cable"], "end": kinds}
         columns = columns_in(table, {"x y z": units.length}) | vectors_of(table, "force", "F", force)
         yield text_table("Ends of cables, and the forces on them", words, columns)
     if len(table := certificate.rooms):

@@ -69,8 +69,8 @@ def verdict_sentences(
     if theorem is not None:
         sentences.append(sentence(theorem.text(units)))
     if planes := ", ".join(certificate.symmetric_in):
-        text = f"This is the piece of the roof between its mirror planes ({planes}); the verdict is about"
-        sentences.append(f"{text} changes of shape that are symmetric in them.")
+        about = f"the verdict is about changes of shape that are symmetric in {planes}"
+        sentences.append(f"This is {certificate.part}; {about}.")
     if certificate.cuts_itself:
         sentences.append(f"It cannot be built as it is: {certificate.cuts_itself}.")
     if count := len(certificate.pinched):

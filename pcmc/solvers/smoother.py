@@ -122,8 +122,9 @@ class HarmonicExtension:
 
     The motion is extended harmonically into the sheets, L with equal tensions: with the inside i and the
     curves c,  L_ii w_i = -L_ic w_c. Vertices that slide on a plane stay on it, so that triangles beside a
-    mirror plane move as in the whole. Each sheet vertex takes the part of w along its sheet, which does not
-    change the shape, as far as its support lets it.
+    mirror plane move as in the whole, but for planes oblique to the axes as in ``Smoother``. Each sheet
+    vertex takes the part of w along its sheet, which does not change the shape, as far as its support lets
+    it.
     """
 
     def __init__(

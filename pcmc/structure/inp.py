@@ -66,7 +66,8 @@ def text_of(
     heading = "pcmc structural model", mark, certificate.verdict.value, certificate.part
     text = [f"*HEADING\n{'; '.join(filter(None, heading))}\n" + (f"** {model.note}\n" if model.note else "")]
     supports = certificate.supports[["support", "kind", "name"]].to_numpy().tolist()
-    notes = [f"PATCH_{k}: {patch.name}" for k, patch in enumerate(surface.patches, 1)]
+    parts = {"PATCH": surface.patches, "CABLE": surface.cables, "MEMBER": model.beams}
+    notes = [f"{kind}_{k}: {one.name}" for kind, those in parts.items() for k, one in enumerate(those, 1)]
     notes += [f"SUPPORT_{label}: {kind}, {name}" for label, kind, name in supports]
     text += map(_comment, [*notes, *(f"step {k}: {step.name}" for k, step in enumerate(steps, 1))])
     text += [card("NODE, NSET=NALL", nodes + 1, surface.vertices[nodes] / unit)]
@@ -129,7 +130,6 @@ def _beams(model: StructuralModel, unit: float) -> Iterator[str]:
         own = between + np.arange((PIECES - 1) * len(line.pairs)).reshape(-1, PIECES - 1)
         first, between = first + elements.size, between + own.size
         width, height, factor = line.member.profile.equal_rectangle
-        yield _comment(f"MEMBER_{k}: {line.name}")
         (a, b), share = X[line.pairs.T][:, :, None], np.arange(1, PIECES)[:, None] / PIECES
         yield card("NODE", own.ravel(), (a + share * (b - a)).reshape(-1, 3) / unit)
         ends = last + 1 + np.stack([of[:-1], of[1:]], axis=1)

@@ -309,10 +309,15 @@ def mirror_edges(planes: Sequence[tuple[Plane, Bools]], topo: Topology) -> Bools
     return topo.boundary_edge & np.any([np.zeros(len(topo.edges), dtype=bool), *inside], axis=0)
 
 
-def part_of_roof(planes: Sequence[tuple[Plane, Bools]]) -> str:
-    """What a surface with these planes is of its roof, in words; empty for a whole roof."""
-    there = any(plane.mirror for plane, _ in planes)
-    return "part of a roof that goes on behind its mirror planes" if there else ""
+def part_of_roof(surface: Any) -> str:
+    """What a surface is of its roof, in words, with the cables that its mirror planes cut along; empty for a
+    whole roof."""
+    if not any(plane.mirror for plane, _ in surface.on_planes):
+        return ""
+    inside, number = surface.mirror_edge, surface.topology.edge_numbers
+    cut = ", ".join(repr(cable.name) for cable in surface.cables if inside[number(cable.edges)].all())
+    half = f" and has half of the force of {cut}" if cut else ""
+    return f"part of a roof that goes on behind its mirror planes{half}"
 
 
 def symmetric_part(planes: Sequence[tuple[Plane, Bools]], vectors: Floats) -> Floats:

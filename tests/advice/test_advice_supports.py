@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import drawn
+import numpy as np
 import pytest
 import tomlkit
 from drawn import drawing
@@ -250,3 +251,11 @@ def test_a_point_in_a_mirror_is_inside_the_whole_roof():
     found = [[(m.text, m.clearance, m.in_mirror) for m in point_masts(plan)] for plan in (whole, half)]
     assert found == [[("[6, 4, 4]", 4.0, False)], [("[6, 4, 4]", pytest.approx(4.0), True)]]
     assert "lead the outline around it on an arc of radius 0.48 around [6, 4, 4]" in mast_note(half)
+
+
+@pytest.mark.parametrize("unit", [0.3, 1.0, 7.0, 1000.0])
+def test_the_end_of_a_mirror_is_a_point_of_the_rim(unit):
+    """In m a sail on such points got the note of a mast inside, in mm it did not."""
+    outline = unit * np.array([[0, 0], [5, 0], [5, 8], [0, 8]])
+    sail = {"edge": "cable", "cable": 9.0, "tension": 1.0, "pressure": 0.0, "edge_length": 0.6 * unit}
+    assert not point_masts(Plan(outline, supports=outline, mirrors=[outline[1:3]], **sail))

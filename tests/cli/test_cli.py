@@ -117,6 +117,13 @@ def test_remesh_writes_the_whole_roof_that_a_project_asks_for(folder):
         assert np.ptp(pcmc.read("x.pcmc").vertices[:, 0]) == pytest.approx(8.0)
 
 
+def test_the_terminal_says_that_a_roof_is_a_part(folder, capsys):
+    (folder / "half.toml").write_text(SMALL.replace("patches =", "mirrors = [[[4, 0], [4, 3]]]\npatches ="))
+    assert cli.main(["solve", "half.toml", "--no-mesh-check"]) == 0
+    first, *_ = capsys.readouterr().out.splitlines()
+    assert "triangles, part of a roof that goes on behind its mirror planes; newton: converged" in first
+
+
 def test_convert_and_plot(solved, capsys):
     assert cli.main(["convert", "roof.pcmc", "roof.ply"]) == 0
     assert pcmc.read("roof.ply").m == pcmc.read("roof.pcmc").m

@@ -208,7 +208,9 @@ def test_the_cloth_of_the_structural_model_is_the_one_that_is_cut(tmp_path):
     assert "cut shorter  by 0.3" in str(pattern)
     words = " ".join(words_of(tmp_path / "hall.pdf"))
     assert "Cutting pattern, scale 1:" in words
-    assert f"{len(pattern.strips)} strips, together" in words
+    area, cut = (f"{pattern.table[of].sum():.4g}" for of in ("area", "cut_area"))
+    assert area != cut
+    assert f"{len(pattern.strips)} strips, together {area} m² on the roof, {cut} m² cut" in words
     path.write_text(text + 'compensation = [0.5, 1.0]\n[output]\npattern = ["cloth.csv"]\n')
     project.run(path)
     table = pd.read_csv(tmp_path / "cloth.csv")

@@ -117,6 +117,12 @@ def test_where_no_size_balances_the_pressure_the_nearest_that_does_is_named(pres
         free_cell(minimal_cell("P", 1), pressure, free="size")
 
 
+def test_of_a_surface_that_is_not_at_rest_there_is_no_stress():
+    foam = kelvin_foam(1)
+    with pytest.raises(SurfaceError, match="cell_stress: not at rest"):
+        cell_stress(foam.rebuilt(vertices=foam.vertices @ np.diag([1.1, 1.0, 1.0])))
+
+
 def test_what_a_cell_that_is_free_cannot_have_is_refused():
     corners = [[x, y, 0.0] for y in range(4) for x in range(4)]
     first = [k for k in range(12) if k % 4 < 3]

@@ -14,9 +14,12 @@ import pcmc
 from generators.grid import grid_faces
 from pcmc import Cable, Material, Patch, Plane, SelfWeight, Snow, StructuralModel, Surface, Wind, cli
 from pcmc.base.errors import LostWarning, OptionError
+from pcmc.base.units import Units
 from pcmc.drawings.views import model_curves
 from pcmc.plan import Plan
 from pcmc.project.members import warn_of_members
+from pcmc.report.tables import cable_tables
+from pcmc.report.words import verdict_sentences
 from pcmc.structure import analyse
 from pcmc.structure.section import Structure
 
@@ -97,13 +100,24 @@ def test_a_cable_in_a_mirror_is_in_balance_as_in_the_whole():
     assert 2.0 * half.cables[columns].to_numpy() == pytest.approx(whole.cables[columns].to_numpy(), rel=1e-6)
 
 
+def test_a_part_says_that_a_cable_has_half_of_its_force():
+    """Sheets and files had 3 kN for a cable of 6 kN without a word."""
+    half, whole = (pcmc.certify(surface) for surface in halves())
+    assert half.part.endswith("behind its mirror planes and has half of the force of 'ridge'")
+    assert not whole.part
+    assert any(half.part in sentence for sentence in verdict_sentences(half))
+
+
 def test_a_mirror_holds_no_end_of_a_cable():
     """The cable goes on behind it: "held" told of a support in the middle of the roof."""
     line = {"curve": [[0, 3], [5, 3]], "cable": 3.0, "wall": False}
     outline, mirror = [[0, 0], [5, 0], [5, 6], [0, 6]], [[[5, 0], [5, 6]]]
     half = Plan(outline, [line], mirrors=mirror, edge_length=1.0, tension=3.0, pressure=0.5).surface()
-    ends = pcmc.certify(half).cable_ends
+    certificate = pcmc.certify(half)
+    ends = certificate.cable_ends
     assert dict(zip(ends.x, ends.held, strict=True)) == {0.0: True, 5.0: False}
+    _, table = cable_tables(certificate, Units("m", "kN"))
+    assert {tuple(row[1:3]) for row in table.rows} == {("held", "0.000"), ("mirror", "5.000")}
 
 
 def test_under_a_cable_across_one_patch_no_curvature_is_asked_for():

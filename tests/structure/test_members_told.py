@@ -18,6 +18,7 @@ from pcmc.plot import member_forces
 from pcmc.report.chapters import under_load_chapter
 from pcmc.report.tables import Picture, Table
 from pcmc.structure import Member, Profile, analyse
+from pcmc.structure.inp import text_of
 from pcmc.structure.member_forces import (
     cable_notes,
     members_at_rest,
@@ -90,6 +91,7 @@ def test_beams_and_columns_of_one_name_have_numbers():
     column = Member([[0, 0], [0, 0, -1]], *steel, name="edge")
     model = model_of(film, members=[*ends, column], anyway=True)
     assert [line.name for line in (*model.lines, *model.bars)] == ["edge-1", "edge-2", "edge-3"]
+    assert "** MEMBER_1: edge-1\n** MEMBER_2: edge-2\n" in text_of(model, model.steps).partition("*NODE")[0]
 
 
 @pytest.mark.parametrize("profile", [TUBE, Profile(5.38e-3, 8.36e-5, 6.04e-6)], ids=["tube", "I"])

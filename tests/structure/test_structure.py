@@ -216,7 +216,7 @@ def test_self_weight_is_the_same_force_in_all_units(tmp_path, units, metres, new
     assert fixed.steps[1].gravity == 2.0
 
 
-def test_supports_are_named_by_kind_and_number(tmp_path):
+def test_supports_and_cables_are_named_at_the_head(tmp_path):
     sail = pcmc.solve(hypar_roof(4)).surface
     model = model_of(sail, cable_area=1e-4)
     pcmc.write_structure(tmp_path / "sail.inp", model)
@@ -226,6 +226,8 @@ def test_supports_are_named_by_kind_and_number(tmp_path):
         (node,) = found[f"*NSET, NSET=SUPPORT_{label}"][0]
         np.testing.assert_array_equal(sail.vertices[int(node) - 1], [x, y, z])
         assert f"** SUPPORT_{label}: point, {label}\n" in text
+    for number, cable in enumerate(sail.cables, 1):
+        assert f"** CABLE_{number}: {cable.name}\n" in text
 
 
 def test_without_units_the_model_says_that_it_takes_metres():

@@ -64,6 +64,7 @@ class Tracer:
         self.events: list[dict[str, Any]] = []
         self.surfaces: dict[int, Surface] = {}
         self.arclength, self.held = 0.0, False  # whether walls with held bottoms can pinch
+        self.in_vain = ""  # what became of the last new mesh, if it was not used
         self.here = first or self.first_point(self.mesh(surface))
 
     def mesh(self, surface: Surface) -> BranchMesh:
@@ -121,7 +122,7 @@ class Tracer:
                         length = min(CONTACT_STEP, self.options.largest)
                     elif length < self.options.smallest:
                         collapsed = isinstance(reason, MeshCollapsed)
-                        return Ending.DEGENERATE if collapsed else Ending.LOST, difficulty
+                        return Ending.DEGENERATE if collapsed else Ending.LOST, difficulty + self.in_vain
             self.events += events
             self.arclength += segment.length
             self.here = segment.end
@@ -221,12 +222,14 @@ class Tracer:
                 self.continue_from(replace(here, X=X, iterations=0), tangent)
         here, tangent = self.here.state, self.here.tangent
         if self.options.remesh is not None and here.quality < wanted:
+            self.in_vain = "; the last new mesh led to no point of the branch"
             try:
                 mesh = self.mesh(remesh(here.whole, self.options.remesh))
             except SurfaceError:
                 return
             start = BranchState(mesh, mesh.surface.vertices, here.parameter)
             self.continue_from(start, tangent.on(here, start))
+            self.in_vain *= self.here.state is here
 
     def let_held_walls_pinch(self) -> bool:
         """From here on let walls come down on held bottoms; False if none can, or they already do."""

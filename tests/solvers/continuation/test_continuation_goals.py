@@ -146,6 +146,19 @@ def test_mesh_that_collapses_ends_the_branch_with_that_reason():
     assert branch.points.quality.iloc[-1] < 0.05
 
 
+def test_a_mesh_that_collapses_says_that_new_meshes_were_in_vain(monkeypatch):
+    pytest.importorskip("mmgpy")
+
+    def refuse(surface, edge_length):
+        raise SurfaceError("no mesh", what="surface")
+
+    monkeypatch.setattr("pcmc.solvers.continuation.tracing.remesh", refuse)
+    start = solve(two_caps(1.2), target="stationary").surface
+    branch = follow(start, Direction({"small": 1.0}), 8.0, remesh=1.2)
+    assert branch.ending is Ending.DEGENERATE
+    assert branch.detail.endswith("; the last new mesh led to no point of the branch")
+
+
 # ----------------------------------------------------------------------------------------- errors
 
 
