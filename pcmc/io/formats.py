@@ -89,6 +89,11 @@ def _bent(held: HeldCurve) -> bool:
     return any(len(piece.points) > 2 for piece in held.curve.pieces)
 
 
+def _elsewhere(plane: Plane) -> bool:
+    """Whether heights over it are not the z of a file."""
+    return plane.normal != (0.0, 0.0, 1.0) or plane.point[2] != 0.0
+
+
 PARTS = {
     "weights": FormatPart("weights", 4, lambda surface, _: surface.weights.any()),
     "snow": FormatPart("snow", 5, lambda surface, _: surface.snows.any()),
@@ -96,7 +101,7 @@ PARTS = {
     "cables": FormatPart("cables", 6, lambda surface, _: surface.cables),
     "cable weights": FormatPart("weights of cables", 8, lambda surface, _: surface.cable_edges.weight.any()),
     "rooms": FormatPart(ROOMS, 6, lambda surface, _: surface.rooms),
-    "plane": FormatPart("its plane Π", 1, lambda surface, _: surface.plane != Plane()),
+    "plane": FormatPart("its plane Π", 1, lambda surface, _: _elsewhere(surface.plane)),
     "planes": FormatPart(PLANES, 6, lambda surface, _: surface.on_planes),
     "curves": FormatPart("", 7, lambda surface, _: surface.held_curves),
     "bent curves": FormatPart(BENT, 7, lambda surface, _: any(map(_bent, surface.held_curves))),

@@ -261,7 +261,7 @@ def check_outputs(
         elif path.exists() and not os.access(path, os.W_OK):
             problem = "is there and read-only; name another file, or let it be written"
         elif place in seen:
-            problem = "is named twice, if capitals count as small letters; name two files"
+            problem = "is named twice (capitals count as small letters); name two files"
         elif folder != made and not folder.is_dir():
             problem = f"there is no folder {folder}; create it first"
         elif not there.is_dir():
