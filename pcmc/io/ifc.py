@@ -242,8 +242,9 @@ class _Model:
             "SecondMomentAcross": ("IfcMomentOfInertiaMeasure", profile.moments[1]),
             "YoungsModulus": (self.of_force("IfcPlanarForceMeasure"), member.material.young),
             "PoissonsRatio": ("IfcReal", member.material.poisson),
-            "MassDensity": (self.of_force("IfcMassDensityMeasure"), member.material.density),
         }
+        if density := member.material.density:  # else it is not known, as of a column
+            values["MassDensity"] = self.of_force("IfcMassDensityMeasure"), density
         for key, value in zip(("LeastForceAtRest", "LargestForceAtRest"), line.forces or (), strict=False):
             values[key] = self.of_force("IfcForceMeasure"), value
         self.add_properties("Pcmc_Member", element, values, line.name)

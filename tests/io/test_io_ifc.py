@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import ifcopenshell
 import numpy as np
@@ -109,7 +110,8 @@ def test_members_have_profiles_and_the_volume_of_their_length(tmp_path):
     profiles = pcmc.Profile.rectangle(0.1, 0.2), pcmc.Profile(1e-3, 1e-6)
     members = [pcmc.Member("wall 1", pcmc.Profile.tube(0.1, 0.005), steel)]
     for y, profile in zip(sides, profiles, strict=True):
-        members.append(pcmc.Member(polyline([[0, y], [4, y]]), profile, steel, name=f"edge {y:.0f}"))
+        of = replace(steel, density=7.85 * (y == 0.0))  # else it is not known
+        members.append(pcmc.Member(polyline([[0, y], [4, y]]), profile, of, name=f"edge {y:.0f}"))
     model = StructuralModel(surface, steel, 1e-3, members=members, anyway=True)
     path, lines = tmp_path / "a.ifc", drawn_members(model)
     pcmc.write(path, surface, units=Units("m", "kN"), members=lines)
@@ -124,6 +126,7 @@ def test_members_have_profiles_and_the_volume_of_their_length(tmp_path):
         "IfcMassDensityMeasure",
         "IfcCurvatureMeasure",
     )
+    assert [get_pset(parts[f"edge {y}"], "Pcmc_Member").get("MassDensity") for y in (0, 2)] == [7.85, None]
     assert get_material(arch).ForProfileSet.MaterialProfiles[0].Profile.WallThickness == 0.005
     lengths = {line.name: line.segments(np.eye(3)[2])[2].sum() for line in lines}
     for part, profile in ((parts["edge 0"], profiles[0]), (arch, members[0].profile)):
