@@ -123,12 +123,12 @@ def test_two_caps_under_one_gas_are_a_double_well():
     h = np.array([1.25, 1.25, 1.642024, 1.0 / 1.642024])
     volumes, areas = np.pi * h * (3.0 + h**2) / 6.0, np.pi * (1.0 + h**2)
     assert volumes[:2].sum() == pytest.approx(volumes[2:].sum(), rel=1e-6)
-    pair = solve(volume_cases.connected_caps(volumes[:2].sum()), target="stationary")
+    pair = solve(volume_cases.connected_caps(volumes[:2].sum(), 0.17), target="stationary")
     found = find_equilibria(pair, Direction(volumes={"both": 1.0}), starts=0)
     assert [one.index for one in found.found] == [0, 0, 1]
     for one, other in ((1, 2), (2, 1)):
         exact = areas[:2].sum() - areas[2:].sum()
-        assert found.barrier(one, other) == pytest.approx(exact, rel=0.12)
+        assert found.barrier(one, other) == pytest.approx(exact, rel=0.05)
     assert not found.failed  # both branches reach their minimum, also where a start has found it before
 
 

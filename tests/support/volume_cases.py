@@ -29,9 +29,9 @@ def raised(height: float = 0.5) -> Surface:
     return replace(roof, vertices=roof.vertices + height * np.eye(3)[2])
 
 
-def connected_caps(volume: float) -> Surface:
+def connected_caps(volume: float, edge: float = 0.34) -> Surface:
     """Two caps over unit discs apart from each other, with one pressure and one volume together."""
-    one = generators.spherical_cap(0.34, height=1.3)
+    one = generators.spherical_cap(edge, height=1.3)
     aside = 2.5 * np.eye(3)[0]
     X = np.concatenate([one.vertices - aside, one.vertices + aside])
     F = np.concatenate([one.faces, one.faces + one.n])
