@@ -95,8 +95,8 @@ def structure(
         analysis = analyse(model, progress=progress) if run else None
         jobs += analysis_jobs(roof, output, analysis) if analysis is not None else []
         written = write_all(jobs, progress)
-    if model.note:
-        print(model.note)
+    for note in filter(None, (model.note, model.certificate.part)):
+        print(note)
     steps = ", ".join(step.name for step in model.steps)
     print(f"{len(model.faces)} elements, {int(model.nodes.sum())} nodes; steps: {steps}")
     if analysis is None:

@@ -122,6 +122,9 @@ def test_the_terminal_says_that_a_roof_is_a_part(folder, capsys):
     assert cli.main(["solve", "half.toml", "--no-mesh-check"]) == 0
     first, *_ = capsys.readouterr().out.splitlines()
     assert "triangles, part of a roof that goes on behind its mirror planes; newton: converged" in first
+    model = ["structure", "half.toml", "-o", "half.inp", "--thickness", "0.001", "--young", "1e6"]
+    assert cli.main(model) == 0
+    assert "part of a roof that goes on behind its mirror planes" in capsys.readouterr().out.splitlines()
 
 
 def test_convert_and_plot(solved, capsys):
