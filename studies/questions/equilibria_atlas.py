@@ -233,7 +233,7 @@ def figure(folder: Folder) -> None:
             shapes.append(folder.read_mesh(file_name(f"{case}-{row['number']}"))["at rest"])
             titles.append(f"{case} {row['number']}: index {row['index']}")
     panel(
-        shapes, folder.figure("atlas"), columns=4, titles=titles, supports=False, one_scale=False, width=1000
+        shapes, folder.figure("atlas"), columns=4, titles=titles, supports=False, one_scale=False, width=820
     )
 
 
