@@ -17,7 +17,7 @@ from .solving import certify_, equilibria_, remesh_, solve_, sweep
 
 
 class Command(TyperCommand):
-    """A command that refuses an option given twice, of which the library would take the last."""
+    """A command that refuses an option given twice. Typer itself takes the last one."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         *_, order = self.make_parser(ctx).parse_args(args=[*args])

@@ -223,8 +223,8 @@ class _Search:
             raise StopIteration
         self.found.append(FoundEquilibrium(surface, certificate, how))
         self.shapes.append(shape)
-        why = only_coarse(surface, standing_part(surface).walls.pinchable)
-        self.failed += [f"The equilibrium {how}: {why}."] * bool(why)
+        if why := only_coarse(surface, standing_part(surface).walls.pinchable):
+            self.failed.append(f"The equilibrium {how}: {why}.")
         return len(self.found) - 1
 
     def follow(self, line: TracedParameter, number: int) -> None:

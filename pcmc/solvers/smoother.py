@@ -84,8 +84,8 @@ def _free_along_axes(surface: Surface, movable: Bools) -> tuple[Floats, Bools, I
     axes, masks = _axes(surface), list[Bools]()
     planes = ((surface.plane, surface.on_plane | surface.given_supports.on_plane), *surface.on_planes)
     for axis in axes:
-        across = [on for plane, on in planes if np.linalg.norm(np.cross(axis, plane.normal)) <= PARALLEL]
-        masks.append(movable & ~np.logical_or.reduce([~movable, *across]))
+        free = [~on for plane, on in planes if np.linalg.norm(np.cross(axis, plane.normal)) <= PARALLEL]
+        masks.append(np.logical_and.reduce([movable, *free]))
     return axes, *np.unique(masks, axis=0, return_inverse=True)
 
 

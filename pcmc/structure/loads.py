@@ -23,7 +23,7 @@ FORM = "form"  # what combinations call the form-finding load
 FORM_STEPS = ("form pressure", "form pressure less snow")  # its step without snow, and with
 EVEN = 1e-6  # of the size, squared: a patch with less area in the plan faces to neither side
 STEEPEST = 180.0  # degrees: a face that looks down
-PARTS = 10  # along each side of a face, of which each is within an area or not
+PARTS = 10  # pieces along each side of a face: each piece is inside an area or outside
 SAME = 0.1  # of a face: a smaller difference of two areas is none
 
 
@@ -215,7 +215,7 @@ def check_loads(
         validate.refuse("loads", loads, expected)
     every = [load for entry in loads for load in acting_together(entry)]
     if len({load.gravity for load in every if isinstance(load, SelfWeight)}) > 1:
-        text = "loads: self-weights of several gravities, of which one replaces the other; give them one"
+        text = "loads: self-weights have different gravities, and a model has one; give all the same"
         raise OptionError(text, what="loads")
     leaning = leaning_mirrors(surface.plane, surface.on_planes)
     for load in every:
