@@ -44,6 +44,7 @@ EDGES_FROM = 9.0  # pixels: a mesh edge shorter than this is not drawn
 DOTS_FROM = 7.0  # pixels: nor are supports closer together than this
 CELL_WIDTH = 700  # pixels of a picture in a notebook
 ABOVE = 7.0  # pixels above a title and below a picture
+WIDEST = 0.93  # of its picture's width: a title, whose letters shrink in steps
 FLAT_PERCENT = 1.0  # the least end of the scale of planarity: a glass pane bears a few tenths
 RED = ARROW = "#B2182B"
 AT_POINTS = "#2166AC"
@@ -179,9 +180,11 @@ def compose(
     if mark or colors is not None or any(drawing.title for drawing in drawings):
         figure.get_layout_engine().set(h_pad=ABOVE / DPI)
     axes = grid(figure, len(frames), columns, height_ratios=heights)
-    for place, drawing in zip(axes, drawings, strict=True):
+    for place, drawing, frame in zip(axes, drawings, frames, strict=True):
         place.set_axis_off()
-        place.set_title(drawing.title, fontsize=TEXT, color=INK, pad=5.0)
+        title = place.set_title(drawing.title, fontsize=TEXT, color=INK, pad=5.0)
+        title.set_parse_math(False)
+        title.set_fontsize(TEXT * min(1.0, WIDEST * frame.size[0] / (title.get_window_extent().width + 1.0)))
     if colors is not None:
         colors.bar(figure, axes, label)
     images = []

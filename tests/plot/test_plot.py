@@ -323,3 +323,13 @@ def test_powers_of_ten_at_an_axis_stay_short():
     ink = (picture < 128).any(axis=2)
     frame = int(ink[: len(ink) // 2].sum(axis=0).argmax())  # the vertical axis
     assert frame < 0.15 * picture.shape[1]
+
+
+def test_long_titles_do_not_run_into_each_other_or_over_the_edge(monkeypatch):
+    """"drift in the valley, at 50 % of it, slack from 39 %" was cut at both ends."""
+    found, cap = [], spherical_cap(0.5)
+    monkeypatch.setattr("pcmc.plot.pictures.finish", lambda figure, _: found.append(figure))
+    plot.panel([cap, cap], titles=["a title that is far too long for its picture", "cap"], width=300)
+    long, short = (axes.title for axes in found[0].axes[:2])
+    assert long.get_window_extent().width <= 150.0
+    assert long.get_fontsize() < short.get_fontsize()
