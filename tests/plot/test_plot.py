@@ -326,7 +326,7 @@ def test_powers_of_ten_at_an_axis_stay_short():
 
 
 def test_long_titles_do_not_run_into_each_other_or_over_the_edge(monkeypatch):
-    """"drift in the valley, at 50 % of it, slack from 39 %" was cut at both ends."""
+    """ "drift in the valley, at 50 % of it, slack from 39 %" was cut at both ends."""
     found, cap = [], spherical_cap(0.5)
     monkeypatch.setattr("pcmc.plot.pictures.finish", lambda figure, _: found.append(figure))
     plot.panel([cap, cap], titles=["a title that is far too long for its picture", "cap"], width=300)
