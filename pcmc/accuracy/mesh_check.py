@@ -60,7 +60,7 @@ class MeshCheck:
 
     verdict: MeshVerdict
     detail: str
-    place: tuple[float, float, float] | None
+    place: tuple[float, ...] | None
     advice: str
     table: pd.DataFrame
     surfaces: tuple[Surface, ...]

@@ -121,6 +121,12 @@ def sequence(
     return refuse(name, value, expected, error=error) if found is None else found
 
 
+def cloth(what: str, text: str, warp: float, weft: float, poisson: float) -> None:
+    """Refuse stiffnesses with ν² weft ≥ warp: such a cloth is not stable. ``text`` begins the message."""
+    if poisson**2 * weft >= warp:
+        raise OptionError(f"{text} = {warp / poisson**2:.4g}, found {weft:g}", what=what, found=weft)
+
+
 def triple(name: str, value: Any, *, error: type[PcmcError] = OptionError) -> tuple[float, float, float]:
     """Three finite numbers.
 

@@ -52,10 +52,6 @@ class Topology:
     valence: Ints  # (e,) the number of triangles at each edge
     placed: Ints | None = None  # (m,3) the faces with images of vertices, where some are images of others
 
-    def __post_init__(self) -> None:
-        for array in (self.edges, self.edge_of_face, self.valence):
-            read_only(array)
-
     @cached_array
     def sense(self) -> Ints:
         """(m,3) int: +1 where a face runs along the edge of ``edge_of_face`` as its row does, else -1."""
@@ -205,7 +201,7 @@ def topology(faces: Ints, patch_of_face: Ints, vertex_count: int, placed: Ints |
     ([[0, 2]], [1, 2, 1, 1, 1])
     """
     corners = np.ascontiguousarray(faces, dtype=np.int32)
-    edges, edge_of_face, valence = _number_edges(corners, vertex_count)
+    edges, edge_of_face, valence = map(read_only, _number_edges(corners, vertex_count))
     return Topology(faces, patch_of_face, vertex_count, edges, edge_of_face, valence, placed)
 
 
