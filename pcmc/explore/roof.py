@@ -174,7 +174,6 @@ class Watch:
         threading.Thread(target=self._run, daemon=True).start()
 
     def close(self) -> None:
-        """End the thread."""
         self._end.set()
 
     def _run(self) -> None:

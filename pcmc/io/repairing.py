@@ -130,9 +130,8 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     surface = to_surface(MeshData(answer["points"], answer["faces"], patch, patches, plane=data.plane))
     changes = {done: number for done, number in answer["changes"].items() if number}
     given: dict[str, Any] = {"supports": data.support is not None and np.any(data.support)}
-    given |= {
-        key: getattr(data, key) or data.parts.get(key) for key in ("cables", "rooms", "planes", "lines")
-    }
+    for key in ("cables", "rooms", "planes", "lines"):
+        given[key] = getattr(data, key) or data.parts.get(key)
     given["curved elements"] = max(data.order, data.parts.get("order", 1)) > 1
     given["images"] = len(data.images) + len(data.parts.get("images", ())) > 0
     left_out = ", ".join(name for name, there in given.items() if there)

@@ -11,22 +11,10 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError, unknown
-from .figure import (
-    CURVES,
-    INK,
-    SMALL,
-    TEXT,
-    Image,
-    Path,
-    color_bar,
-    color_map,
-    finish,
-    fit_height,
-    grid,
-    new,
-    overlap_style,
-    style,
-)
+from ..base.files import PathLike
+from .colours import color_bar, color_map
+from .figure import CURVES, INK, SMALL, TEXT, finish, fit_height, grid, new, overlap_style, style
+from .scene import Image
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +29,7 @@ WIDEST_BESIDE = 0.4  # of a figure's width: a wider legend stays inside the axes
 
 def lines(
     curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]],
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     x: str = "",
     y: str = "",
@@ -102,7 +90,7 @@ def _plain_ticks(axis: Any) -> None:
 
 def histories(
     frames: Mapping[str, pd.DataFrame],
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     y: str = "energy",
     x: str | None = None,
@@ -137,7 +125,7 @@ def histories(
 
 def convergence(
     curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]],
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     x: str = "edge length",
     y: str = "error",
@@ -178,7 +166,7 @@ def heatmap(
     x: npt.ArrayLike,
     y: npt.ArrayLike,
     tables: Mapping[str, npt.ArrayLike],
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     marks: Mapping[str, npt.ArrayLike] | None = None,
     xlabel: str = "",
@@ -237,7 +225,7 @@ def heatmap(
 
 def diagram(
     branches: Mapping[str, Any],
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     x: str = "parameter",
     y: str = "height",

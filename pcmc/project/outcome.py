@@ -274,9 +274,8 @@ class Outcome:
         if self.unfold:
             cloth = wanted.of_whole(self.surface, surface)
             structure = structure and structure.of_whole(self.surface, surface, None)
-        cut = partial(
-            cutting_pattern_of, surface, of_material(cloth, structure, surface), anyway, certificate
-        )
+        cloth = of_material(cloth, structure, surface)
+        cut = partial(cutting_pattern_of, surface, cloth, anyway, certificate)
         own = project is not None and wanted is project.pattern
         return self._once("cutting pattern", cut) if own else cut()
 
