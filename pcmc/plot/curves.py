@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
 from ..base import validate
 from ..base.arrays import Floats
@@ -15,9 +16,6 @@ from ..base.files import PathLike
 from .colours import color_bar, color_map
 from .figure import CURVES, INK, SMALL, TEXT, finish, fit_height, grid, new, overlap_style, style
 from .scene import Image
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SCALES = ("linear", "log")
 MARKERS = "osD^vPX"
