@@ -161,7 +161,7 @@ class _Source(NamedTuple):
                 names = tuple(dict.fromkeys([*known, *keys, *near]))
                 text, section = unknown("number", name, names), name.partition(".")[0]
                 if section in LATER:
-                    text = f"{name}: the table is of shapes, which do not depend on [{section}]; sweep another"
+                    text = f"{name}: no shape depends on [{section}]; sweep another number"
                 raise OptionError(f"{self.path}: {text}", what=name, expected=names)
             kind, part = known[name]
             parts, field, _ = KINDS[kind]
