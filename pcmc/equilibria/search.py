@@ -15,6 +15,7 @@ from ..base import validate
 from ..base.errors import NoBranch, OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..base.tolerances import AT_REST
+from ..base.validate import check_options, flag, integer, option
 from ..certificate import certify
 from ..certificate.verdict import only_coarse
 from ..forces.loose_parts import part_size
@@ -65,22 +66,19 @@ class SearchOptions:
     """
 
     span: Span | None = None
-    starts: int = 6
-    depth: int = 2
-    most: int = 24
-    seed: int = 0
-    mesh_check: bool = False
+    starts: int = option(6, integer)
+    depth: int = option(2, integer)
+    most: int = option(24, integer, least=1)
+    seed: int = option(0, integer)
+    mesh_check: bool = option(False, flag)
 
     def __post_init__(self) -> None:
+        check_options(self)
         if self.span is not None:
             if not isinstance(self.span, Sequence) or len(self.span) != 2:
                 validate.refuse("span", self.span, "two numbers, the least and the largest value")
             for value in self.span:
                 validate.number("span", value)
-        for name in ("starts", "depth", "seed"):
-            validate.integer(name, getattr(self, name))
-        validate.integer("most", self.most, least=1)
-        validate.flag("mesh_check", self.mesh_check)
 
 
 def find_equilibria(

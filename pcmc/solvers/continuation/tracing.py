@@ -202,10 +202,8 @@ class Tracer:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
         part = near.rest.part
         whole = part.whole_at(part.landed(near.X, near.mesh.reaches_plane(near.X)))
-        own = self.options
-        result = solve_once(
-            whole, "newton", target="stationary", tolerance=own.tolerance, backend=own.backend
-        )
+        given = {"tolerance": self.options.tolerance, "backend": self.options.backend}
+        result = solve_once(whole, target="stationary", **given)
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
         if not result.converged:
