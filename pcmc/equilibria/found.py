@@ -182,6 +182,8 @@ class Equilibria:
         words = [*self.barrier_lines(units), *self.searched, *self.failed, stopped, half, INCOMPLETE]
         return "\n".join(line for line in (units.sentence if units else "", rows, *words) if line)
 
+    __repr__ = text
+
     def barrier_lines(self, units: Units = NO_UNITS) -> list[str]:
         """A line for each barrier: from where, over which saddle, to where, its energy; last the unknown."""
         lines = list[str]()
@@ -197,6 +199,3 @@ class Equilibria:
             ends = f"from {joined[0][0]} to {', '.join(map(str, group))}"
             lines.append(f"barrier {ends}: not known, as no saddle was found between them")
         return lines
-
-    def __repr__(self) -> str:
-        return self.text()

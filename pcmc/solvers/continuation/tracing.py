@@ -261,7 +261,6 @@ class Tracer:
             self.here = after
 
     def events_on(self, segment: Segment) -> list[dict[str, Any]]:
-        """The events on a segment, in their order."""
         start, end, length = segment.start, segment.end, segment.length
         if not segment.same_mesh or length <= 2.0 * EVENT_ACCURACY:
             events = self.events_between(start, end, length)
