@@ -302,10 +302,8 @@ def net_drawings(
     validate.choice("sheet", sheet, tuple(FORMATS))
     length = expect_length(as_units(units).length, "drawings of panels")
     millimetres, decimals = length_factor(length, "mm"), length_decimals(length, net.mesh.size)
-    curves = [
-        SheetLine(net.points[loop], "PCMC-PANEL", True, name=f"panel {k}")
-        for k, loop in enumerate(net.polygons, start=1)
-    ]
+    loops = enumerate(net.polygons, start=1)
+    curves = [SheetLine(net.points[loop], "PCMC-PANEL", True, f"panel {k}") for k, loop in loops]
     lines = [line._replace(points=line.points[:, :2]) for line in curves]
     numbers = [(line.points.mean(axis=0), str(k), np.zeros(2)) for k, line in enumerate(lines, start=1)]
     ends = [np.array([column.min(), column.max()]) for column in net.points[:, :2].T]

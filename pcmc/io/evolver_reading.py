@@ -26,9 +26,8 @@ from .text import TextSection, constant, kinds_of, line_ends, linear_expression
 WRITTEN = "written by pcmc"
 NUMBERED = r"(\d+)((?:[^\S\n]+-?\d+){})([^\n]*)"  # an element, the numbers of its parts, and the rest
 ROUNDING = 1e-12  # of the largest pressure: what is left of differences
-UNREADABLE = (
-    "string|quadratic|lagrange|simplex_representation|torus|torus_filled|symmetry_group|#include|#define"
-)
+UNREADABLE = "string|quadratic|lagrange|simplex_representation|torus|torus_filled|symmetry_group"
+UNREADABLE += "|#include|#define"
 
 
 def read(path: Path) -> MeshData:

@@ -20,6 +20,7 @@ from ..base.errors import FileError, OptionError, PcmcError
 from ..base.files import as_path
 from ..base.libraries import read_arrays, require, unreadable
 from ..base.units import NO_UNITS, Units
+from ..meshing.remeshing import MOST, remesh, triangles_for
 from ..surface import Plane, Surface
 from ..surface.geometry import face_areas
 from .mesh_data import MeshData, converted, to_surface, within
@@ -112,8 +113,6 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     size = float(np.linalg.norm(np.ptp(finite, axis=0))) if len(finite) else 0.0
     several = len(data.patches) > 1
     if edge_length is not None:
-        from ..meshing.remeshing import MOST, triangles_for  # takes long to import
-
         least = math.sqrt(np.nansum(triangles_for(face_areas(X[F]), np.ones(len(F)))) / MOST)
         if edge_length < least:
             better = f"use {1.01 * least:.2g} or more"
@@ -130,9 +129,8 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     surface = to_surface(MeshData(answer["points"], answer["faces"], patch, patches, plane=data.plane))
     changes = {done: number for done, number in answer["changes"].items() if number}
     given: dict[str, Any] = {"supports": data.support is not None and np.any(data.support)}
-    given |= {
-        key: getattr(data, key) or data.parts.get(key) for key in ("cables", "rooms", "planes", "lines")
-    }
+    for key in ("cables", "rooms", "planes", "lines"):
+        given[key] = getattr(data, key) or data.parts.get(key)
     given["curved elements"] = max(data.order, data.parts.get("order", 1)) > 1
     given["images"] = len(data.images) + len(data.parts.get("images", ())) > 0
     left_out = ", ".join(name for name, there in given.items() if there)
@@ -140,8 +138,6 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     notes = (*data.notes, *([f"left out: {left_out}{held}"] if left_out else []))
     if edge_length is not None:
         if several:
-            from ..meshing.remeshing import remesh  # needs the extra remesh
-
             surface = remesh(surface, edge_length)
         notes = (*notes, f"{len(F)} triangles became {surface.m}")
     return Repaired(surface, changes, notes, data.units, data.bare)

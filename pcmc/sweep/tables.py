@@ -16,7 +16,7 @@ from .store import Record
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..plot.figure import Image
+    from ..plot.scene import Image
 
 TABLES = (".csv", ".parquet")
 FIRST = ("status", "verdict", "extent", "mesh_verdict", "targets_met", "accuracy_reached")
