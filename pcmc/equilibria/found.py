@@ -153,9 +153,8 @@ class Equilibria:
         """
         validate.choice("start", str(validate.integer("start", start)), [str(k) for k in self.stable])
         if to is None:
-            out = (b for b in self.barriers if b.start == start and b.to != start)
-            ways = (b.energy for b in out if not b.lost)
-            return min(ways, default=math.inf)
+            out = (b.energy for b in self.barriers if b.start == start and b.to != start and not b.lost)
+            return min(out, default=math.inf)
         validate.choice("to", str(validate.integer("to", to)), [str(k) for k in self.stable])
         reached, top = set[int | None]({start}), -math.inf
         while to not in reached:

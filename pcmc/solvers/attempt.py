@@ -118,7 +118,7 @@ class NewtonRun:
 
     def run(self) -> NewtonRun:
         """Step until the end, or on from there; ``status`` then gives the reason."""
-        self.status = until_stopped(self._iterate)
+        self.status = until_stopped(self._iterate, Status.STOPPED)
         if self.status is Status.STOPPED:  # perhaps in the middle of a step
             X, version = self._shown
             self.state.go_to(X if version == self.state.version else self.state.at.X)

@@ -175,7 +175,7 @@ def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callb
     'lbfgs: converged: the residual is below its tolerance'
     """
     objective = Objective(surface, options or LbfgsOptions(), callback)
-    status = until_stopped(objective.minimize)
+    status = until_stopped(objective.minimize, Status.STOPPED)
     evaluate, best, rows = objective.evaluate, objective.best, objective.rows
     if best is None or (rows[-1]["energy"], rows[-1]["gradient_squared"]) != (best.energy, best.squared):
         best = evaluate(surface.vertices if best is None else best.X)

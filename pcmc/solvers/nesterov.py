@@ -119,7 +119,7 @@ def nesterov(
         return status
 
     add_row(move)
-    status = until_stopped(run)
+    status = until_stopped(run, Status.STOPPED)
     end, status = surface.moved(move.point.X), evaluate.ending(move.point) or status
     del rows[move.iteration + 1 :]  # Ctrl-C may come between a row and its move
     return Result(end, status, "nesterov", move.point.energy, move.iteration, evaluate.count, rows)

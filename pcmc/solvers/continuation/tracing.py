@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import Any
 
 from ...base.errors import NoBranch, SurfaceError
-from ...base.interrupts import stop_requested
 from ...base.tolerances import EVENT_ACCURACY, START_RESIDUAL
 from ...forces.rooms import room_pressures
 from ...meshing.quality import redistribute, turns_over
@@ -100,13 +99,6 @@ class Tracer:
 
     def run(self) -> tuple[Ending, str]:
         """Follow the branch to its end; why it ends, and the last difficulty."""
-        try:
-            return self._advance()
-        except (StopIteration, KeyboardInterrupt) as error:
-            stop_requested(error)
-            return Ending.STOPPED, ""
-
-    def _advance(self) -> tuple[Ending, str]:
         self.record()
         if any(getattr(self.here.state, name) == goal for name, goal in self.goals.items()):
             return Ending.REACHED, ""
