@@ -65,8 +65,15 @@ def deflated_newton(start: Surface, known: Sequence[Shape]) -> Result | None:
     return None
 
 
+def going_on(result: Result) -> Result:
+    """What a solve gave; KeyboardInterrupt where it was stopped, as that stops the search."""
+    if result.status is Status.STOPPED:
+        raise KeyboardInterrupt
+    return result
+
+
 def _stationary(start: Surface) -> Result | None:
-    result = solve_once(start, target="stationary")
+    result = going_on(solve_once(start, target="stationary"))
     return result if result.converged else None
 
 

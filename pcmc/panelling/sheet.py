@@ -53,7 +53,6 @@ class SheetMesh:
 
     @cached_property
     def topology(self) -> Topology:
-        """Edges of the sheet."""
         return topology(self.F, np.zeros(len(self.F), dtype=np.int64), len(self.X))
 
     @cached_property

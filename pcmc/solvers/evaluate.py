@@ -76,7 +76,6 @@ class Evaluator:
         self._single = len(blocks(surface.m)) == 1 and not (self._mesh.curved or surface.heavy)
 
     def row(self, point: Point) -> dict[str, Any]:
-        """The point as a row of a solver's history."""
         return {"evaluation": self.count, "energy": point.energy, "gradient_squared": point.squared}
 
     def ending(self, point: Point) -> Status | None:

@@ -89,7 +89,6 @@ def factoriser(pattern: Pattern, backend: str | None = None, units: Floats | Non
     With ``units`` u (N,), U A U is factorised in place of A, U = diag(u) > 0, so that weak parts are not
     taken for zero beside strong ones. Neither the solution nor the inertia depends on them.
 
-    >>> import numpy as np
     >>> from scipy.sparse import csr_array
     >>> pattern = Pattern(np.array([0, 2, 3]), np.array([0, 1, 1]), np.empty((0, 3)))
     >>> factor = factoriser(pattern, "superlu").factor(np.array([1.0, 2.0, 1.0]))
