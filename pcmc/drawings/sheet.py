@@ -1,6 +1,5 @@
 """Sheets of paper: their formats, layers, lines and texts, in millimetres from the lower left corner; and
-their pages in a PDF file, of true size, with texts that can be searched.
-"""
+their pages in a PDF file, of true size, with texts that can be searched."""
 
 from __future__ import annotations
 
@@ -151,6 +150,7 @@ class Dimension(NamedTuple):
 
 
 TICK = np.array([[-0.8, -0.8], [0.8, 0.8]])  # mm
+Lines = Sequence[SheetLine]
 
 
 @dataclass
@@ -177,11 +177,7 @@ class Sheet:
 
 
 def place_labels(
-    labels: Sequence[Text],
-    others: Sequence[Text],
-    lines: Sequence[SheetLine] = (),
-    rings: int = 6,
-    needed: bool = True,
+    labels: Sequence[Text], others: Sequence[Text], lines: Lines, rings: int = 6, needed: bool = True
 ) -> list[Text]:
     """Labels at or beside their places, so that none covers another text; nor a line, where there is room.
 
@@ -330,7 +326,7 @@ def write_pdf(sheets: Sequence[Sheet], path: Path) -> None:
     canvas.save()
 
 
-def paint_sheet(canvas: Any, lines: Sequence[SheetLine], texts: Sequence[Text], boxed: bool = False) -> None:
+def paint_sheet(canvas: Any, lines: Lines, texts: Sequence[Text], boxed: bool = False) -> None:
     """Draw on a canvas of reportlab, from its origin; ``boxed`` texts hide what is behind them."""
     from reportlab.lib.colors import HexColor
     from reportlab.lib.units import mm

@@ -20,6 +20,7 @@ from .sheet import (
     MEMBERS,
     SMALL,
     Dimension,
+    Lines,
     Sheet,
     SheetLine,
     Text,
@@ -42,7 +43,6 @@ ELEVATIONS = {  # to the right, and towards the viewer
     "north, seen against y": ((-1.0, 0.0), (0.0, 1.0)),
     "west, seen along x": ((0.0, -1.0), (-1.0, 0.0)),
 }
-Lines = Sequence[SheetLine]
 
 
 @dataclass

@@ -17,7 +17,7 @@ from typing import Any, cast
 from .. import project as projects
 from ..accuracy import MeshCheck
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
-from ..base.files import atomic_write
+from ..base.files import PathLike, atomic_write
 from ..base.libraries import load_library
 from ..base.units import NO_UNITS, Units
 from ..design import Parameter, Target
@@ -126,7 +126,7 @@ class ShownRoof:
 
 
 def read_roof(
-    path: str | os.PathLike[str],
+    path: PathLike,
     *,
     start_shape: bool = False,
     use_cache: bool = True,

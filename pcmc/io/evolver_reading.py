@@ -1,6 +1,5 @@
 """The reader of Surface Evolver datafiles: those that ``evolver`` and the program's ``dump`` write, and
-others whose sections list elements by number.
-"""
+others whose sections list elements by number."""
 
 from __future__ import annotations
 
@@ -147,8 +146,7 @@ def _pressures(
     file: _Datafile, face_ids: Ints
 ) -> tuple[Floats, dict[tuple[str, float], Ints], tuple[str, ...]]:
     """(m,) pressure along each face's normal: the sum over the bodies on its two sides; and the bodies of
-    prescribed volume: by number and volume, (m,) 1 or -1 where a face bounds them.
-    """
+    prescribed volume: by number and volume, (m,) 1 or -1 where a face bounds them."""
     pressure = np.zeros(len(face_ids))
     prescribed: dict[tuple[str, float], Ints] = {}
     if "bodies" not in file:

@@ -1,11 +1,9 @@
 """Meshes of other programs through MeshLab (pymeshlab, licence GPL), which repairs them and also reads .off,
-.3ds, .dae and .x3d.
-"""
+.3ds, .dae and .x3d."""
 
 from __future__ import annotations
 
 import math
-import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -17,7 +15,7 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import FileError, OptionError, PcmcError
-from ..base.files import as_path
+from ..base.files import PathLike, as_path
 from ..base.libraries import read_arrays, require, unreadable
 from ..base.units import NO_UNITS, Units
 from ..meshing.remeshing import MOST, remesh, triangles_for
@@ -51,7 +49,7 @@ class Repaired:
 
 
 def repair(
-    path: str | os.PathLike[str],
+    path: PathLike,
     *,
     weld: float | None = None,
     holes: int = HOLES,

@@ -83,8 +83,7 @@ def style(axes: Any) -> Any:
 
 def overlap_style(k: int, count: int) -> dict[str, Any]:
     """Line style of curve ``k`` of ``count`` by which curves that lie on each other all stay visible: wide
-    and solid, then thinner and thinner, dashed in each other's gaps.
-    """
+    and solid, then thinner and thinner, dashed in each other's gaps."""
     if k == 0:
         return {"linewidth": 2.6, "linestyle": "-"}
     width = 1.6 - 0.6 * (k - 1) / max(1, count - 2)

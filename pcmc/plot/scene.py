@@ -163,8 +163,7 @@ def _nearest(count: int, parts: Ints, near: Floats) -> Floats:
 
 def _light(surface: Surface, shown: Bools, view: Camera, strength: float, smooth: bool) -> Floats:
     """(t,3) brightness at the corners of a matt sheet seen from either side, lit from above the left; normals
-    are the faces', or if ``smooth`` their means at each vertex in its patch.
-    """
+    are the faces', or if ``smooth`` their means at each vertex in its patch."""
     F = surface.faces
     area = area_vectors(surface.vertices[F])
     normal = np.repeat(area[:, None], 3, axis=1)
