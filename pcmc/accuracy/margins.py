@@ -206,9 +206,6 @@ class Margin:
         number = {f"{of}_value": self.value} if math.isnan(self.factor) else {of: self.factor}
         return {**number, f"{of}_error": self.bar, f"{of}_ends_by": self.ends_by.name.lower()}
 
-    def __repr__(self) -> str:
-        return self.text()
-
     def text(self, units: Units = NO_UNITS) -> str:
         """The margin in a sentence."""
         holds = f"stays a saddle of index {self.index}" if self.index else "holds"
@@ -223,6 +220,8 @@ class Margin:
         holds += f"{mesh}{' at least' * at_least} {'up' if self.more else 'down'} to"
         text = f"{holds} {shown}{then} ({self.ends_by.value})"
         return "; ".join(filter(None, (text, self.detail)))
+
+    __repr__ = text
 
 
 def margin(

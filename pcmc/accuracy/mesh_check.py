@@ -60,7 +60,7 @@ class MeshCheck:
 
     verdict: MeshVerdict
     detail: str
-    place: tuple[float, float, float] | None
+    place: tuple[float, ...] | None
     advice: str
     table: pd.DataFrame
     surfaces: tuple[Surface, ...]
@@ -104,11 +104,10 @@ class MeshCheck:
         """The verdict, its reason and the table, with the units of its numbers if they are given."""
         return f"{self._head()}\n\n{_text_table(self.table, units)}"
 
+    __repr__ = text
+
     def _head(self) -> str:
         return "\n".join(filter(None, (self.verdict.value, self.detail, self.advice)))
-
-    def __repr__(self) -> str:
-        return self.text()
 
 
 def check_mesh(

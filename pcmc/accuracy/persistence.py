@@ -52,7 +52,7 @@ class Finding(NamedTuple):
 
     verdict: MeshVerdict
     reason: str
-    place: tuple[float, float, float] | None = None
+    place: tuple[float, ...] | None = None
     advice: str = ""
 
 
@@ -229,7 +229,8 @@ def _other_contact(coarse: Surface, fine: Surface) -> Finding | None:
         if abs(after[k] - before[k]) > 2.0 * lengths.max() + RESTED * lengths.sum():
             reason = f"on {fine.m} triangles the junction over {coarse.patches[k].name!r} rests on the plane"
             reason += f" along {after[k]:.3g} of its length {lengths.sum():.3g}, here along {before[k]:.3g}"
-            return Finding(MeshVerdict.CHANGES, reason, _tuple(coarse.vertices[tops].mean(axis=(0, 1))))
+            place = coarse.vertices[tops].mean(axis=(0, 1))
+            return Finding(MeshVerdict.CHANGES, reason, tuple(place.tolist()))
     return None
 
 
@@ -261,9 +262,4 @@ def _at(verdict: MeshVerdict, surface: Surface, reason: str, place: Floats, more
             ending += ", where only the mesh holds it"
             advice = f'hold the bottom of {wall!r}: bottom = "held" under its divider in a plan, or add its'
             advice += " lowest vertices to fixed="
-    return Finding(verdict, reason + ending, _tuple(place), advice)
-
-
-def _tuple(place: Floats) -> tuple[float, float, float]:
-    x, y, z = place.tolist()
-    return x, y, z
+    return Finding(verdict, reason + ending, tuple(place.tolist()), advice)

@@ -68,11 +68,14 @@ def readings(surface: Surface, certificate: Certificate, vertices: int) -> dict[
     pull = share * tension * size
     against = 0.0 - certificate.load  # never -0
     add("reaction", "", certificate.support, pull, against)
-    alone = against if len(certificate.supports) == 1 else None
+    normal = np.array(surface.plane.normal)
+    lifts = certificate.supports[[*FORCE]].to_numpy() @ normal
+    alone = (np.abs(lifts) > pull).sum() == 1  # an upright mirror plane carries nothing up
     for on, patches, name, force, most in _held_lines(surface, certificate):
         old = np.sort(on[on < vertices]).tobytes()
-        up, along = force @ np.array(surface.plane.normal), np.linalg.norm(surface.plane.along(force))
-        add("reaction", name, float(up), pull, alone, ("reaction", "", patches, old))
+        up, along = float(force @ normal), np.linalg.norm(surface.plane.along(force))
+        loads = against if alone and abs(up) > pull else None
+        add("reaction", name, up, pull, loads, ("reaction", "", patches, old))
         add("thrust", name, float(along), pull, None, ("thrust", "", patches, old))
         what = "reaction per length"
         add(what, name, most, share * tension, None, (what, "", patches, old))

@@ -87,9 +87,8 @@ def check_apexes(plan: Plan | None, surface: Surface, targets: Sequence[Target],
         top = float(heights[corners[surface.pinned[corners]]].max(initial=-math.inf))
         if top <= highest + near:
             continue
-        rims = (
-            (h.name, h.curve.local(surface.plane).at(h.curve.dense)) for h in (plan.holes if plan else ())
-        )
+        holes = plan.holes if plan else ()
+        rims = ((h.name, h.curve.local(surface.plane).at(h.curve.dense)) for h in holes)
         raised = (name for name, at in rims if at.shape[1] > 2 and abs(float(at[:, 2].max()) - top) <= near)
         holder, unit = next(raised, "a support"), units.behind("length")
         text = f"{holder} is held at {top:.6g}{unit}, so the {target.label} cannot be {highest:.6g}{unit}"

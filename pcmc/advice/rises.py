@@ -301,11 +301,8 @@ def mast_note(plan: Plan, *, drawn: bool = False) -> str:
         return ""
     points = ", ".join(mast.text for mast in masts[:4])
     ring = ring_lines(masts[:1], max(mast.share for mast in masts), drawn=drawn)
-    change = (
-        f"hold it on a ring instead: {ring[0]}"
-        if drawn
-        else f"hold it on a ring, in [[plan.holes]], instead: {ring[2]}"
-    )
+    where, line = ("", ring[0]) if drawn else (", in [[plan.holes]],", ring[2])
+    change = f"hold it on a ring{where} instead: {line}"
     if (high := masts[0]).top[2] != high.point[2]:
         change += "; no ring can be as high as the point"
     if cut := [mast for mast in masts if mast.in_mirror]:  # the outline is to leave out its half

@@ -7,8 +7,9 @@ message; ``error`` is the exception to raise.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import fields
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import field, fields
+from functools import partial
 from numbers import Integral, Real
 from operator import ge, gt, le, lt
 from reprlib import Repr
@@ -121,6 +122,12 @@ def sequence(
     return refuse(name, value, expected, error=error) if found is None else found
 
 
+def cloth(what: str, text: str, warp: float, weft: float, poisson: float) -> None:
+    """Refuse stiffnesses with ν² weft ≥ warp: such a cloth is not stable. ``text`` begins the message."""
+    if poisson**2 * weft >= warp:
+        raise OptionError(f"{text} = {warp / poisson**2:.4g}, found {weft:g}", what=what, found=weft)
+
+
 def triple(name: str, value: Any, *, error: type[PcmcError] = OptionError) -> tuple[float, float, float]:
     """Three finite numbers.
 
@@ -148,6 +155,19 @@ def choice(name: str, value: object, known: Sequence[str]) -> str:
         found = value if isinstance(value, str) else shown(value)
         raise OptionError(unknown(name, found, known), what=name, found=value, expected=tuple(known))
     return str(value)
+
+
+def option(default: Any, check: Callable[..., object], **limits: object) -> Any:
+    """A field of an options dataclass, with the check of this module that ``check_options`` makes of it."""
+    return field(default=default, metadata={"check": partial(check, **limits)})
+
+
+def check_options(options: DataclassInstance) -> None:
+    """Refuse values that the ``option`` fields of a dataclass do not allow; their type may allow None."""
+    for each in fields(options):
+        value, check = getattr(options, each.name), each.metadata.get("check")
+        if check is not None and not (value is None and "None" in str(each.type)):
+            check(each.name, value)
 
 
 def options_from(kind: type[Options], method: str, given: dict[str, Any]) -> Options:

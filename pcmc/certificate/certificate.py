@@ -235,9 +235,6 @@ class Certificate:
             "load_ratio": self.load_ratio,
         }
 
-    def __repr__(self) -> str:
-        return self.text()
-
     def text(self, units: Units = NO_UNITS) -> str:
         """The findings as a table, with the units of its numbers if they are given."""
         lowest, sums, force = self.eigenvalues, (self.load, self.support), units.behind("force")
@@ -265,6 +262,8 @@ class Certificate:
         shown = self.patches, self.rooms, self.junctions, supports, self.cables, self.cable_ends
         texts = [t.to_string(index=False, float_format=lambda x: f"{x:.4g}") for t in shown if len(t)]
         return "\n\n".join([head, *texts])
+
+    __repr__ = text
 
 
 def certify(

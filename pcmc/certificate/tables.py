@@ -72,14 +72,13 @@ def patch_table(surface: Surface, standing: Surface) -> pd.DataFrame:
     for index, patch in enumerate(surface.patches):
         faces = standing.patch_of_face == index
         inside = mask_of(standing.faces[faces], surface.n) & np.isfinite(curvature)
-        varies = patch.weight and inside.any()
-        mean = float(curvature[inside].mean()) if inside.any() else np.nan
+        mean, aim = [float(H[inside].mean()) if inside.any() else np.nan for H in (curvature, target)]
         row: dict[str, Any] = {
             "patch": patch.name,
             "tension": patch.tension,
             "pressure": patch.pressure,
             **({"snow": patch.snow, "net": patch.net_pressure} if surface.snows.any() else {}),
-            "target": float(target[inside].mean()) if varies else patch.target_curvature,
+            "target": aim if patch.weight else patch.target_curvature,
             "area": float(areas[index]),
             "mean_H": 0.0 if abs(mean) * surface.size < ON else mean,
         }

@@ -78,9 +78,6 @@ class Theorem:
     spare: float | None = None
     rigid: int = 0
 
-    def __repr__(self) -> str:
-        return self.text()
-
     def brief(self, units: Units = NO_UNITS) -> str:
         """The theorem in a line: "proved: index 0, within 1.3e-09 m"."""
         if not self.proved:
@@ -105,6 +102,8 @@ class Theorem:
             f" {self.index}{among}, and no eigenvalue of its second variation{these} is within"
             f" {self.gap:.2g}{tension} of zero{rests}"
         )
+
+    __repr__ = text
 
 
 class _Unproved(Exception):

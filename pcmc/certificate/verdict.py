@@ -121,7 +121,6 @@ class Findings:
 
     @property
     def collapsed(self) -> bool:
-        """Whether triangles have collapsed."""
         return self.evidence is Evidence.COLLAPSED or self.quality <= COLLAPSED
 
     @property

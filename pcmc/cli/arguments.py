@@ -33,17 +33,16 @@ from .options import by_part, option, parsed_unit, switch
 TOML, DXF = ".toml", ".dxf"
 READ = (TOML, *FORMATS, *READ_ONLY, DXF)  # suffixes of what commands read
 
-
 EVERY = "A bare VALUE applies to every patch that is not named"
+CABLES = "A bare VALUE applies to all that are not named"
 LOADED = "A bare VALUE applies to every patch under pressure that is not named"
 UPDATED = "wall pressures are updated"
 MESH_CHECK = f"Solve on two finer meshes, too, for error bars; by default up to {MOST_CHECKED} triangles."
 START = "The start shape of a project, before it is solved, instead of its designed roof."
 CACHE = "Keep a project's roof and take it from there the next time; --no-cache solves it again."
 WHOLE = "Unfold a surface at its mirror planes: the whole roof instead of its piece."
-UNITS = (
-    f"Unit of the lengths: {', '.join(LENGTHS)}. A file in another one is converted; by default the file's."
-)
+UNITS = f"Unit of the lengths: {', '.join(LENGTHS)}."
+UNITS += " A file in another one is converted; by default the file's."
 UNCERTIFIED = "Accept a roof that is not certified or misses its targets; every sheet and page is marked."
 INPUT = "A surface, a project (.toml), or a drawing (.dxf, .3dm)."
 Input = Annotated[Path, typer.Argument(metavar="FILE", help=INPUT)]
@@ -68,9 +67,7 @@ class Loads:
     pressure: Annotated[list[str] | None, by_part(f"Pressure on a patch. {LOADED}; {UPDATED}.")] = None
     weight: Annotated[list[str] | None, by_part(f"Weight of a patch per area. {EVERY}.")] = None
     snow: Annotated[list[str] | None, by_part(f"Snow on a patch, per area of the plan. {LOADED}.")] = None
-    cable: Annotated[
-        list[str] | None, by_part("Tension of a cable. A bare VALUE applies to all that are not named.")
-    ] = None
+    cable: Annotated[list[str] | None, by_part(f"Tension of a cable. {CABLES}.")] = None
     cable_weight: Annotated[list[str] | None, by_part("Weight of a cable per length.")] = None
     volume: Annotated[list[str] | None, by_part("Volume of a room that has one already.")] = None
 

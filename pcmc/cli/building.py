@@ -69,8 +69,7 @@ def structure(
         start = projects.surface_of(project)
         patches = [patch.name for patch in start.patches]
         values: dict[str, Any] = {} if project.structure is None else asdict(project.structure)
-        plain = {k: v for k, v in vars(given).items() if k not in ("thickness", "wind") and v is not None}
-        values |= plain
+        values |= {k: v for k, v in vars(given).items() if k not in ("thickness", "wind") and v is not None}
         if given.thickness:
             thick = arguments.by_name(patches, given.thickness, "--thickness")
             if project.structure is not None:

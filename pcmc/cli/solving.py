@@ -40,9 +40,8 @@ from .reports import sweeping, working
 
 TARGET = "minimum, or stationary to accept saddles too (newton only)."
 MESHES = "Check the mesh on this many meshes in all, 3 for error bars and orders."
-ACCURACY = (
-    "Error bar wanted, such as height=1e-3: finer triangles where the error comes from; may be repeated."
-)
+ACCURACY = "Error bar wanted, such as height=1e-3: finer triangles where the error comes from;"
+ACCURACY += " may be repeated."
 ACCURACY_OF = "mesh: the value on the mesh is to be so accurate; limit: the extrapolated one."
 MOST_TRIANGLES = f"The most that the mesh for an accuracy may have, {TRIANGLES} by default."
 WHOLE_INDEX = "Of a surface with mirror planes certify the whole: motions that are not symmetric count, too."

@@ -51,7 +51,6 @@ class CutMesh:
 
     @cached_property
     def topology(self) -> Topology:
-        """Edges of the mesh."""
         return topology(self.F, np.zeros(len(self.F), dtype=np.int64), len(self.X))
 
     @cached_property

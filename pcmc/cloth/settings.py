@@ -29,6 +29,7 @@ NUMBERS: dict[str, dict[str, Any]] = {  # keys of numbers, with their limits
 }
 PAIR = "two numbers, [warp, weft]"
 PAIRS = ("compensation", "stiffness")  # keys of two numbers, [warp, weft]
+TABLE = {"kind": "a number or a table"}  # of keys that may be tables, as messages call it
 BY_PATCH = ("strips", "direction", "stiffness", "poisson")  # keys that may be tables
 
 
@@ -56,16 +57,14 @@ class CuttingOptions:
     """
 
     width: float | None = None
-    strips: int | Mapping[str, int] | None = field(default=None, metadata={"kind": "a number or a table"})
+    strips: int | Mapping[str, int] | None = field(default=None, metadata=TABLE)
     seams: Sequence[Any] = field(default=(), metadata={"kind": "a list of lines"})
-    direction: float | Mapping[str, float] | None = field(
-        default=None, metadata={"kind": "a number or a table"}
-    )
+    direction: float | Mapping[str, float] | None = field(default=None, metadata=TABLE)
     compensation: Sequence[float] | None = field(default=None, metadata={"kind": "two numbers"})
     stiffness: Sequence[float] | Mapping[str, Sequence[float]] | None = field(
         default=None, metadata={"kind": "two numbers or a table"}
     )
-    poisson: float | Mapping[str, float] = field(default=0.3, metadata={"kind": "a number or a table"})
+    poisson: float | Mapping[str, float] = field(default=0.3, metadata=TABLE)
     allowance: float = 0.0
     hem: float | None = None
     notches: float | None = None
@@ -138,13 +137,9 @@ class CuttingOptions:
             for name in given if isinstance(given, Mapping) else ():
                 validate.choice(f"patch in {key}", name, names)
         for name in names:
-            (warp, weft), poisson = (
-                self.of_patch("stiffness", name) or (1.0, 0.0),
-                self.of_patch("poisson", name),
-            )
-            if poisson**2 * weft >= warp:  # as of a Material
-                text = f"stiffness of {name!r}: the weft has to be less than warp/poisson²"
-                raise OptionError(f"{text} = {warp / poisson**2:.4g}, found {weft:g}", what="stiffness")
+            warp, weft = self.of_patch("stiffness", name) or (1.0, 0.0)
+            text = f"stiffness of {name!r}: the weft has to be less than warp/poisson²"
+            validate.cloth("stiffness", text, warp, weft, self.of_patch("poisson", name))
         mirrors = [plane for plane, _ in surface.on_planes if plane.mirror]
         for name, mirror in product(np.array(names)[surface.roof].tolist(), mirrors):
             if (degrees := self.of_patch("direction", name)) is None:
@@ -172,10 +167,9 @@ class CuttingOptions:
                 away = mirror.height(points)
                 behind = points - 2.0 * away[:, None] * np.array(mirror.normal)
                 if away.min() < -near and away.max() > near and not _alike(points, behind, near):
-                    text = (
-                        f"seam {number}: it goes on behind the {mirror}, and its image is another one there;"
-                    )
-                    raise OptionError(f"{text} end it at the mirror", what="seams", found=line.tolist())
+                    text = f"seam {number}: it goes on behind the {mirror}, and its image is another one"
+                    text += " there; end it at the mirror"
+                    raise OptionError(text, what="seams", found=line.tolist())
             image = points @ R.T + t
             if plan and (np.abs(plane.height(image)) > near).any():
                 text = "seams: behind a mirror plane that leans the plan is another; give points [x, y, z]"

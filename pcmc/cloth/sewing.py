@@ -106,7 +106,6 @@ class Cloth:
 
     @cached_property
     def sides(self) -> StripSides:
-        """The sides of triangles along cuts and rims."""
         edge = self.mesh.topology.edge_of_face.ravel()
         chosen = np.flatnonzero(self.mesh.cut_edge[edge])
         chosen = chosen[np.argsort(edge[chosen], kind="stable")]

@@ -175,9 +175,6 @@ class CuttingPattern:
         """(k,) the cut lengths of the edges of a seam's side."""
         return segment_lengths(self.strips[side.strip - 1].cut, side.edges)
 
-    def __str__(self) -> str:
-        return self.text()
-
     def text(self, units: Units = NO_UNITS) -> str:
         """Totals and the table of strips, with the units of the numbers if they are given."""
         table, seams = self.table, self.seam_table
@@ -193,3 +190,5 @@ class CuttingPattern:
             rows["cut shorter"] = f"by {warp} along the warp, {weft} along the weft"
         head = head_text(self.certificate, units, rows)
         return f"{head}\n\n{table.to_string(index=False, float_format=lambda x: f'{x:.4g}')}"
+
+    __str__ = text

@@ -156,8 +156,7 @@ def read_vertices(named: Mapping[str, Any], whole: WholeMesh) -> tuple[list[Vert
 
 def shared_vertices(vertices: Sequence[Vertex], weld: bool) -> tuple[Ints, Ints]:
     """Which vertices to keep, and the index among them of every vertex: those of one key are one, and must
-    lie at one place; with ``weld``, those at one place are one.
-    """
+    lie at one place; with ``weld``, those at one place are one."""
     X = np.array([vertex.point for vertex in vertices])
     if weld:
         return coincident(X)
@@ -194,8 +193,7 @@ def read_faces(named: Mapping[str, Any], X: Floats, places: Places) -> tuple[Int
 
 def read_cables(named: Mapping[str, Any], places: Places, names: Sequence[str]) -> tuple[Cable, ...]:
     """A cable for each value of the edges' attribute ``cable``, those in ``names`` first; their attribute
-    ``tension`` is its force.
-    """
+    ``tension`` is its force."""
     edges: dict[str, set[tuple[int, int]]] = {name: set() for name in names}
     tensions: dict[str, float] = {}
     for name, mesh in named.items():

@@ -6,7 +6,6 @@ Names of attributes are those of COMPAS packages where they have one: ``is_suppo
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
@@ -20,6 +19,7 @@ from .. import mean_curvature
 from ..base import validate
 from ..base.arrays import plain
 from ..base.errors import FileWarning, PcmcError, SurfaceError
+from ..base.files import PathLike
 from ..certificate.forces import Forces
 from ..io.mesh_data import FIXED, SLIDING, MeshData, support_of, to_surface
 from ..io.reading import import_warnings
@@ -29,6 +29,7 @@ from .mesh_arrays import CABLE, GUIDE, KEY, PLANES, SLIDES, TENSION
 
 MARKS: dict[str, Any] = {"is_support": False, SLIDES: False, GUIDE: None, PLANES: None}
 QUANTITIES = dict.fromkeys(("mean_curvature", "rx", "ry", "rz"))
+Values = Mapping[str, float] | float | None  # by name, or one for all
 CARRIED = {"vertices", "faces", "patch_of_face", "patches", "fixed", "on_plane", "plane", "on_line"}
 CARRIED |= {"on_planes", "cables", "rooms", "curves", "given_supports"}
 
@@ -95,11 +96,7 @@ def to_meshes(surface: Surface) -> list[Any]:
 
 
 def from_meshes(
-    meshes: Any,
-    *,
-    tensions: Mapping[str, float] | float | None = None,
-    pressures: Mapping[str, float] | float | None = None,
-    weld: bool = False,
+    meshes: Any, *, tensions: Values = None, pressures: Values = None, weld: bool = False
 ) -> Surface:
     """The surface of COMPAS meshes, one per patch.
 
@@ -205,9 +202,6 @@ def _vertex_attributes(surface: Surface) -> list[dict[str, Any]]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-Values = Mapping[str, float] | float | None
-
-
 def solve(
     meshes: Any, tensions: Values = None, pressures: Values = None, weld: bool = False, **options: Any
 ) -> dict[str, Any]:
@@ -262,7 +256,7 @@ def certify(
     return {**values, "warnings": [str(one.message) for one in caught]}
 
 
-def read(path: str | os.PathLike[str], **options: Any) -> list[Any]:
+def read(path: PathLike, **options: Any) -> list[Any]:
     """The meshes of the surface in a file that pcmc reads; options as in ``pcmc.read``.
 
     >>> import tempfile
@@ -277,7 +271,7 @@ def read(path: str | os.PathLike[str], **options: Any) -> list[Any]:
     return to_meshes(pcmc.read(path, **options))
 
 
-def write(path: str | os.PathLike[str], meshes: Any, weld: bool = False, **options: Any) -> None:
+def write(path: PathLike, meshes: Any, weld: bool = False, **options: Any) -> None:
     """Write the surface of COMPAS meshes to a file, as its suffix says; options as in ``pcmc.write``.
 
     >>> import tempfile

@@ -25,7 +25,7 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler
 
 from ..base import validate
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError, unknown
-from ..base.files import atomic_write, check_name, check_regular, system_error, writing
+from ..base.files import PathLike, atomic_write, check_name, check_regular, system_error, writing
 from ..base.libraries import require
 from . import meshes as service
 from .mesh_arrays import damaged_mesh
@@ -69,7 +69,7 @@ def settings_path() -> Path:
     return Path.home() / ".pcmc" / "compas.json"
 
 
-def set_up(folder: str | os.PathLike[str]) -> Path:
+def set_up(folder: PathLike) -> Path:
     """Let the service read and write a folder, made if it is missing; return the file of the settings.
 
     They have a new secret, and the port that they had. A service that runs goes on with them.
@@ -179,8 +179,7 @@ class CallHandler(SimpleXMLRPCRequestHandler):
 
 class LoopbackServer(ThreadingMixIn, Server):
     """The server on the loopback, a thread for each connection. It calls the functions of the service by
-    name, one at a time, with arguments as COMPAS encodes them.
-    """
+    name, one at a time, with arguments as COMPAS encodes them."""
 
     daemon_threads = True
     block_on_close = False

@@ -246,7 +246,6 @@ class Search:
         return self.with_jacobian(trial) if trial.aims else None
 
     def trial(self, x: Floats, result: Result) -> Trial:
-        """The quantities and misfits of a solve."""
         quantities = np.array([measure(result.surface, t).value for t in self.targets])
         wanted = self.wanted(quantities)
         pairs = enumerate(zip(quantities, wanted, strict=True))
@@ -283,7 +282,6 @@ class Search:
         return replace(at, jacobian=by_unknown * (at.r != 0.0)[:, None] / self.scale[:, None])
 
     def is_met(self, at: Trial) -> bool:
-        """Whether every target is met."""
         return bool(np.abs(at.r).max() <= self.tolerance)
 
     def gauss_newton(self, here: Trial) -> tuple[Floats, float]:
@@ -333,7 +331,6 @@ class Search:
             self.callback(pd.Series(self.row(trial)))
 
     def row(self, trial: Trial) -> dict[str, Any]:
-        """The row of the history for a point."""
         values = dict(zip((p.label for p in self.parameters), self.values(trial.x).tolist(), strict=True))
         found = dict(zip((t.label for t in self.targets), trial.quantities.tolist(), strict=bool(trial.aims)))
         return values | found | {"status": trial.status, "misfit": trial.phi}

@@ -40,7 +40,6 @@ class Trial:
 
     @property
     def surface(self) -> Surface:
-        """The surface of a solve."""
         assert isinstance(self.result, Result)
         return self.result.surface
 

@@ -3,7 +3,6 @@ panels at true size."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -16,7 +15,7 @@ import pandas as pd
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..base.files import atomic_writes, suffix_of, writing
+from ..base.files import PathLike, atomic_writes, suffix_of, writing
 from ..base.units import Units, as_units, expect_length, length_factor
 from ..certificate import Certificate
 from ..certificate.certificate import certified
@@ -33,7 +32,7 @@ SUFFIXES, CSV, OBJ = (".dxf", ".pdf", ".svg"), ".csv", ".obj"
 NET_SUFFIXES = (*SUFFIXES, CSV, OBJ)
 NET_TABLES = ("", "nodes", "beams")  # of panels, nodes and beams
 SUPPORT = ["support", "name", "kind", "length", *"xyz", "force_x", "force_y", "force_z"]
-Paths = Iterable[str | os.PathLike[str]]
+Paths = Iterable[PathLike]
 Ends = tuple[tuple[float, float], tuple[float, float]]
 
 
@@ -54,7 +53,7 @@ class DrawingSet:
     members: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  # section, force, … by name
     mark: str = ""  # where the certificate has none
 
-    def files(self, *paths: str | os.PathLike[str]) -> list[tuple[Path, Callable[[Path], None]]]:
+    def files(self, *paths: PathLike) -> list[tuple[Path, Callable[[Path], None]]]:
         """Each file that ``write`` would write, with the function that writes it."""
         jobs: list[tuple[Path, Callable[[Path], None]]] = []
         wanted = [(path, suffix_of(path, SUFFIXES, "a drawing")) for path in map(Path, paths)]
@@ -70,7 +69,7 @@ class DrawingSet:
                 jobs.append((one, partial(dxf.write_svg, document, k)))
         return jobs
 
-    def write(self, *paths: str | os.PathLike[str]) -> list[Path]:
+    def write(self, *paths: PathLike) -> list[Path]:
         """Write .dxf, .pdf (a page per sheet) and .svg (a file NAME-1.svg and so on per sheet).
 
         All files appear together, or none. FileError for another suffix, or a file that cannot be written.
@@ -302,10 +301,8 @@ def net_drawings(
     validate.choice("sheet", sheet, tuple(FORMATS))
     length = expect_length(as_units(units).length, "drawings of panels")
     millimetres, decimals = length_factor(length, "mm"), length_decimals(length, net.mesh.size)
-    curves = [
-        SheetLine(net.points[loop], "PCMC-PANEL", True, name=f"panel {k}")
-        for k, loop in enumerate(net.polygons, start=1)
-    ]
+    loops = enumerate(net.polygons, start=1)
+    curves = [SheetLine(net.points[loop], "PCMC-PANEL", True, f"panel {k}") for k, loop in loops]
     lines = [line._replace(points=line.points[:, :2]) for line in curves]
     numbers = [(line.points.mean(axis=0), str(k), np.zeros(2)) for k, line in enumerate(lines, start=1)]
     ends = [np.array([column.min(), column.max()]) for column in net.points[:, :2].T]

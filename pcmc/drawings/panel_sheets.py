@@ -16,7 +16,7 @@ from ..panelling import PanelNet, Panels
 from ..panelling.planar import laid_flat_polygons
 from ..panelling.schedule import packed, turned_to_fit
 from ..surface.geometry import cross_2d
-from .sheet import WIDTH, Sheet, SheetLine, Text, corner, drawing_area, table_sheets
+from .sheet import CORNER, WIDTH, Sheet, SheetLine, Text, drawing_area, table_sheets
 
 LEAST_WARP = 0.05  # mm: corners that are farther from the panel's plane are marked on its sheet
 
@@ -45,7 +45,7 @@ def panel_sheets(panels: Sequence[FlatPanel], name: str) -> list[Sheet]:
             sheets.append(Sheet("", name, "1:1"))
         named = f"Panel {first}" if panel.number == first else f"Panels {first} to {panel.number}"
         sheets[page].title = f"{named} at true size, outside up"
-        _add_panel(sheets[page], panel._replace(corners=placed + corner() + [0.0, high]))
+        _add_panel(sheets[page], panel._replace(corners=placed + CORNER + [0.0, high]))
     large = [panel for panel, corners in turned if corners is None]
     if large:
         edges = [[f"{x:.1f}" for x in _edges(panel.corners)[1]] for panel in large]

@@ -1,6 +1,5 @@
 """Sheets of paper: their formats, layers, lines and texts, in millimetres from the lower left corner; and
-their pages in a PDF file, of true size, with texts that can be searched.
-"""
+their pages in a PDF file, of true size, with texts that can be searched."""
 
 from __future__ import annotations
 
@@ -23,9 +22,6 @@ FORMATS = {"A4": (210.0, 297.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1
 FORMATS["A0"] = (1189.0, 841.0)
 """Width and height of the sheet formats, mm: ISO 216, landscape but for A4."""
 
-SCALES: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.5)
-SCALES += (1, 2, 5, 10, 20, 25, 50, 100, 200, 250, 500, 1000, 2000, 5000, 10000, 20000, 50000)
-"""The scales that are chosen from where none is given, 1 to this: ISO 5455 and a few between and beyond."""
 DECIMALS = {"m": 3, "cm": 1, "mm": 0, "ft": 4, "in": 2}  # about a millimetre or better
 LENGTHS = {*"xyz", *"abc", "length", "width", "cut length"}  # columns of tables
 DIGITS = 4  # of the largest number of a column, and of the size of a small roof
@@ -33,8 +29,9 @@ DIGITS = 4  # of the largest number of a column, and of the size of a small roof
 MISSED = "TARGETS NOT MET"  # mark of a roof that misses them
 MARGIN, STRIP = 10.0, 16.0  # mm: around the frame; height of the title strip within it
 GAP = 8.0  # mm between views
+CORNER = np.array([MARGIN + GAP, MARGIN + STRIP + GAP])  # mm: the lower left one of what is drawn
 NEAR = 0.5  # mm between points of a line that texts keep off
-TINY, SMALL, LARGE = 1.8, 2.5, 3.5  # mm: heights of letters
+SMALL, LARGE = 2.5, 3.5  # mm: heights of letters
 WIDTH = 0.72  # of a letter, in its height, for what must fit
 
 
@@ -153,6 +150,7 @@ class Dimension(NamedTuple):
 
 
 TICK = np.array([[-0.8, -0.8], [0.8, 0.8]])  # mm
+Lines = Sequence[SheetLine]
 
 
 @dataclass
@@ -179,11 +177,7 @@ class Sheet:
 
 
 def place_labels(
-    labels: Sequence[Text],
-    others: Sequence[Text],
-    lines: Sequence[SheetLine] = (),
-    rings: int = 6,
-    needed: bool = True,
+    labels: Sequence[Text], others: Sequence[Text], lines: Lines, rings: int = 6, needed: bool = True
 ) -> list[Text]:
     """Labels at or beside their places, so that none covers another text; nor a line, where there is room.
 
@@ -230,15 +224,9 @@ def box(text: Text) -> Floats:
     return np.asarray(text.at) + (corners[:, ::-1] if text.turn == 90.0 else corners)
 
 
-def drawing_area(name: str) -> tuple[float, float]:
-    """Width and height, mm, that a format leaves for drawing."""
-    width, height = FORMATS[name]
-    return width - 2 * MARGIN - 2 * GAP, height - 2 * MARGIN - STRIP - 2 * GAP
-
-
-def corner() -> Floats:
-    """(2,) the lower left corner of that drawing_area, mm."""
-    return np.array([MARGIN + GAP, MARGIN + STRIP + GAP])
+def drawing_area(name: str) -> Floats:
+    """(2,) width and height, mm, that a format leaves for drawing; it begins at ``CORNER``."""
+    return np.array(FORMATS[name]) - CORNER - (MARGIN + GAP)
 
 
 def add_frames(sheets: list[Sheet], name: str, units: str, certificate: Certificate, mark: str = "") -> None:
@@ -293,7 +281,7 @@ def table_sheets(
         place = (first - 1) // per_column % columns
         if place == 0:
             sheets.append(Sheet(title, name))
-        left, top = corner() + np.array([place * (across[-1] + GAP), high])
+        left, top = CORNER + np.array([place * (across[-1] + GAP), high])
         right = left + across[1:] - 2.0 * WIDTH * SMALL
         for k, row in enumerate([rows[0], *rows[first : first + per_column]]):
             y = top - (k + 0.5) * step
@@ -338,7 +326,7 @@ def write_pdf(sheets: Sequence[Sheet], path: Path) -> None:
     canvas.save()
 
 
-def paint_sheet(canvas: Any, lines: Sequence[SheetLine], texts: Sequence[Text], boxed: bool = False) -> None:
+def paint_sheet(canvas: Any, lines: Lines, texts: Sequence[Text], boxed: bool = False) -> None:
     """Draw on a canvas of reportlab, from its origin; ``boxed`` texts hide what is behind them."""
     from reportlab.lib.colors import HexColor
     from reportlab.lib.units import mm

@@ -15,32 +15,34 @@ from ..surface import Surface
 from ..surface.geometry import area_vectors
 from ..surface.sections import curves_by_kind, section
 from .sheet import (
+    CORNER,
     FORMATS,
     MEMBERS,
-    SCALES,
     SMALL,
-    TINY,
     Dimension,
+    Lines,
     Sheet,
     SheetLine,
     Text,
-    corner,
     drawing_area,
     place_labels,
     width,
 )
 
+SCALES: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.5)
+SCALES += (1, 2, 5, 10, 20, 25, 50, 100, 200, 250, 500, 1000, 2000, 5000, 10000, 20000, 50000)
+"""The scales that are chosen from where none is given, 1 to this: ISO 5455 and a few between and beyond."""
 ROW = 6.0  # mm between a view and its dimensions, and between their rows
 BEFORE = np.array([2 * ROW + 5.0, 2 * ROW + 10.0])  # mm left of a view and below it: dimensions, title
 BEHIND = np.array([24.0, 4.0])  # mm right of a view and above it: levels
-CORNER = 0.87  # cosine of the turn from which a point of an outline is a corner
+TINY = 1.8  # mm: height of the numbers of setting-out points
+TURN = 0.87  # cosine of the turn from which a point of an outline is a corner
 ELEVATIONS = {  # to the right, and towards the viewer
     "south, seen along y": ((1.0, 0.0), (0.0, -1.0)),
     "east, seen against x": ((0.0, 1.0), (1.0, 0.0)),
     "north, seen against y": ((-1.0, 0.0), (0.0, 1.0)),
     "west, seen along x": ((0.0, -1.0), (-1.0, 0.0)),
 }
-Lines = Sequence[SheetLine]
 
 
 @dataclass
@@ -85,7 +87,7 @@ def outline_places(curves: Lines, axis: Sequence[float]) -> Floats:
             P = curve.points
             before, after = P - np.roll(P, 1, axis=0), np.roll(P, -1, axis=0) - P
             sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-            sharp = np.einsum("ij,ij->i", before, after) < CORNER * sizes
+            sharp = np.einsum("ij,ij->i", before, after) < TURN * sizes
             if not curve.closed:
                 sharp[[0, -1]] = True
             along = P @ np.array(axis)
@@ -178,7 +180,7 @@ def placed(
     for chosen in SCALES if scale is None else (scale,):
         factor = millimetres / chosen
         cell = extent * factor + BEFORE + BEHIND
-        fits = {f: (grids * cell <= np.array(drawing_area(f)) + 1e-9).all(axis=1) for f in FORMATS}
+        fits = {f: (grids * cell <= drawing_area(f) + 1e-9).all(axis=1) for f in FORMATS}
         if fits[name].any():
             break
     else:
@@ -189,7 +191,7 @@ def placed(
         raise OptionError(text, what="scale", found=scale, expected=better)
     columns, rows = grids[fits[name].argmax()].tolist()
     sheet = Sheet(title, name, f"{1 / chosen:g}:1" if chosen < 1 else f"1:{chosen}")
-    origin = corner() + 0.5 * (np.array(drawing_area(name)) - np.array([columns, rows]) * cell) + BEFORE
+    origin = CORNER + 0.5 * (drawing_area(name) - np.array([columns, rows]) * cell) + BEFORE
     for k, (view, (low, high)) in enumerate(zip(views, boxes, strict=True)):
         place = origin + np.array([k % columns, rows - 1 - k // columns]) * cell
         shift = place - factor * low

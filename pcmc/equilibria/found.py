@@ -153,9 +153,8 @@ class Equilibria:
         """
         validate.choice("start", str(validate.integer("start", start)), [str(k) for k in self.stable])
         if to is None:
-            out = (b for b in self.barriers if b.start == start and b.to != start)
-            ways = (b.energy for b in out if not b.lost)
-            return min(ways, default=math.inf)
+            out = (b.energy for b in self.barriers if b.start == start and b.to != start and not b.lost)
+            return min(out, default=math.inf)
         validate.choice("to", str(validate.integer("to", to)), [str(k) for k in self.stable])
         reached, top = set[int | None]({start}), -math.inf
         while to not in reached:
@@ -182,6 +181,8 @@ class Equilibria:
         words = [*self.barrier_lines(units), *self.searched, *self.failed, stopped, half, INCOMPLETE]
         return "\n".join(line for line in (units.sentence if units else "", rows, *words) if line)
 
+    __repr__ = text
+
     def barrier_lines(self, units: Units = NO_UNITS) -> list[str]:
         """A line for each barrier: from where, over which saddle, to where, its energy; last the unknown."""
         lines = list[str]()
@@ -197,6 +198,3 @@ class Equilibria:
             ends = f"from {joined[0][0]} to {', '.join(map(str, group))}"
             lines.append(f"barrier {ends}: not known, as no saddle was found between them")
         return lines
-
-    def __repr__(self) -> str:
-        return self.text()

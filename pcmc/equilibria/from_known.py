@@ -65,8 +65,15 @@ def deflated_newton(start: Surface, known: Sequence[Shape]) -> Result | None:
     return None
 
 
+def going_on(result: Result) -> Result:
+    """What a solve gave; KeyboardInterrupt where it was stopped, as that stops the search."""
+    if result.status is Status.STOPPED:
+        raise KeyboardInterrupt
+    return result
+
+
 def _stationary(start: Surface) -> Result | None:
-    result = solve_once(start, target="stationary")
+    result = going_on(solve_once(start, target="stationary"))
     return result if result.converged else None
 
 
@@ -77,9 +84,13 @@ def _deflated_step(state: SolverState, stepper: Stepper, known: Sequence[Shape])
     if second is None:
         return False
     d, pressures, _ = stepper.direction(second)
-    shapes = (Shape(state.at.X + t * d, state.at.classes.faces) for t in (0.0, DIFFERENCE))
-    here, ahead = (_repulsion(shape, known, state.size) for shape in shapes)
-    slope = (ahead - here) / DIFFERENCE
+
+    def log_factors(t: float) -> float:  # log M, a part t of the step ahead
+        shape, least = Shape(state.at.X + t * d, state.at.classes.faces), 1e-9 * state.size
+        far = np.array([max(shape.distance(other), least) for other in known])  # 0 where it is one of these
+        return float(np.log1p((WIDTH * state.size / far) ** 2).sum())
+
+    slope = (log_factors(DIFFERENCE) - log_factors(0.0)) / DIFFERENCE
     share = 1.0 / (1.0 - slope) if abs(1.0 - slope) > DIFFERENCE else 1.0 / DIFFERENCE
     most = LONGEST * state.size / float(np.linalg.norm(d, axis=1).max())
     share = float(np.clip(share, -most, most))
@@ -90,13 +101,6 @@ def _deflated_step(state: SolverState, stepper: Stepper, known: Sequence[Shape])
             state.move(X, down)
             return True
     return False
-
-
-def _repulsion(shape: Shape, known: Sequence[Shape], size: float) -> float:
-    """log M."""
-    least = 1e-9 * size  # where a start is one of those known
-    far = np.array([max(shape.distance(other), least) for other in known])
-    return float(np.log1p((WIDTH * size / far) ** 2).sum())
 
 
 def way_down(saddle: Surface, mode: Floats) -> tuple[Surface, Status]:

@@ -15,6 +15,7 @@ from ..base import validate
 from ..base.errors import NoBranch, OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..base.tolerances import AT_REST
+from ..base.validate import check_options, flag, integer, option
 from ..certificate import certify
 from ..certificate.verdict import only_coarse
 from ..forces.loose_parts import part_size
@@ -27,7 +28,7 @@ from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
 from .branches import Span, TracedParameter, join_branches
 from .found import Equilibria, FoundEquilibrium, WayDown, pairs
-from .from_known import deflated_newton, pass_between, way_down, with_good_triangles
+from .from_known import deflated_newton, going_on, pass_between, way_down, with_good_triangles
 from .shapes import Shape
 
 MODES = 8  # of the lowest modes a start is displaced along
@@ -65,22 +66,19 @@ class SearchOptions:
     """
 
     span: Span | None = None
-    starts: int = 6
-    depth: int = 2
-    most: int = 24
-    seed: int = 0
-    mesh_check: bool = False
+    starts: int = option(6, integer)
+    depth: int = option(2, integer)
+    most: int = option(24, integer, least=1)
+    seed: int = option(0, integer)
+    mesh_check: bool = option(False, flag)
 
     def __post_init__(self) -> None:
+        check_options(self)
         if self.span is not None:
             if not isinstance(self.span, Sequence) or len(self.span) != 2:
                 validate.refuse("span", self.span, "two numbers, the least and the largest value")
             for value in self.span:
                 validate.number("span", value)
-        for name in ("starts", "depth", "seed"):
-            validate.integer(name, getattr(self, name))
-        validate.integer("most", self.most, least=1)
-        validate.flag("mesh_check", self.mesh_check)
 
 
 def find_equilibria(
@@ -197,16 +195,14 @@ class _Search:
     def first(self) -> None:
         """The surface given, solved if necessary, and the minimum from a low start."""
         if self.add(self.surface, "given") is None:
-            result = solve(self.surface)
+            result = going_on(solve(self.surface))
             if not result.converged:
-                result = solve(self.surface, target="stationary")
-            if result.status is Status.STOPPED:
-                raise KeyboardInterrupt
+                result = going_on(solve(self.surface, target="stationary"))
             if not result.converged:
                 text = f"find_equilibria: no equilibrium was found to begin with; {result.message}"
                 raise SurfaceError(text, what="surface", found=result.status.name)
             self.add(result.surface, "from the start given")
-        if (low := low_start(self.surface)) is not None and (result := solve(low)).converged:
+        if (low := low_start(self.surface)) is not None and (result := going_on(solve(low))).converged:
             self.add(with_good_triangles(result.surface), "from a low start")
 
     def add(self, surface: Surface, how: str) -> int | None:

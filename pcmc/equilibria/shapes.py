@@ -41,10 +41,6 @@ class Shape:
         """(n,) the area around each vertex."""
         return vertex_area_vectors(self.X, self.F)[1]
 
-    def distances(self, points: Floats) -> Floats:
-        """(k,) distance of points (k,3) from the nearest triangle."""
-        return distances(points, self.X, self.F)
-
     @cached_property
     def edge(self) -> float:
         """The mean length of the triangles' edges."""
@@ -52,14 +48,14 @@ class Shape:
 
     def same_as(self, other: Shape) -> bool:
         """Whether both are one shape, as far as their meshes can tell."""
-        mine, its = self.X[np.unique(self.F)], other.X[np.unique(other.F)]
-        farthest = max(self.distances(its).max(), other.distances(mine).max())
+        pairs = ((self, other), (other, self))
+        farthest = max(distances(one.X[np.unique(one.F)], its.X, its.F).max() for one, its in pairs)
         return bool(farthest <= SAME * max(self.edge, other.edge))
 
     def distance(self, other: Shape) -> float:
         """The root mean square distance of each surface's points from the other, by area, both ways."""
         pairs = ((self, other), (other, self))
-        squares = [np.average(its.distances(one.X) ** 2, weights=one.area) for one, its in pairs]
+        squares = [np.average(distances(one.X, its.X, its.F) ** 2, weights=one.area) for one, its in pairs]
         return float(np.sqrt(np.mean(squares)))
 
 

@@ -61,11 +61,6 @@ class Listener(ThreadingHTTPServer):
         self._deadlines: dict[socket.socket, float] = {}
         super().__init__(address, handler)
 
-    def get_request(self) -> tuple[socket.socket, Any]:
-        connection, address = super().get_request()
-        self.limit(connection)
-        return connection, address
-
     def limit(self, connection: Any, seconds: float | None = None) -> None:
         """Close the connection after so many seconds, by default a request's, unless limited again."""
         self._deadlines[connection] = time.monotonic() + (REQUEST_SECONDS if seconds is None else seconds)
@@ -272,7 +267,6 @@ whole, truth, name = of_type("a whole number", int), of_type("true or false", bo
 
 
 def variant_name(what: str, value: Any) -> str:
-    """The name of a new variant."""
     words = " ".join(name(what, value).split())
     if not 0 < len(words) <= 60:
         raise RequestError(f"{what}: expected 1 to 60 characters, found {len(words)}")

@@ -12,11 +12,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from .. import project as projects
+from ..accuracy import MeshCheck
 from ..base.errors import FileError, MissingExtra, OptionError, PcmcError
-from ..base.files import atomic_write
+from ..base.files import PathLike, atomic_write
 from ..base.libraries import load_library
 from ..base.units import NO_UNITS, Units
 from ..design import Parameter, Target
@@ -28,9 +29,6 @@ from ..project.planning import project_text
 from ..project.settings import LISTS, SINGLE
 from ..project.values import data_with_values, differences
 from ..surface import Surface
-
-if TYPE_CHECKING:
-    from ..accuracy import MeshCheck
 
 EVERY = 0.5  # seconds between two looks at the files
 Signature = tuple[tuple[str, tuple[int, ...]], ...]
@@ -101,7 +99,7 @@ class ShownRoof:
         known = {(self.outcome.unfold, "mesh check"): check}
         outcome = dataclasses.replace(self.outcome, result=None, start=surface, _known=known)
         projects.firmer(outcome, None, progress)
-        return cast("MeshCheck", outcome.mesh_check)
+        return cast(MeshCheck, outcome.mesh_check)
 
     @cached_property
     def note(self) -> str:
@@ -128,7 +126,7 @@ class ShownRoof:
 
 
 def read_roof(
-    path: str | os.PathLike[str],
+    path: PathLike,
     *,
     start_shape: bool = False,
     use_cache: bool = True,
@@ -174,7 +172,6 @@ class Watch:
         threading.Thread(target=self._run, daemon=True).start()
 
     def close(self) -> None:
-        """End the thread."""
         self._end.set()
 
     def _run(self) -> None:

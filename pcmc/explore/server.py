@@ -89,7 +89,6 @@ class Explorer:
         return name, session
 
     def session(self, name: str) -> Session:
-        """The session of that name."""
         with self._lock:
             if name not in self.sessions:
                 raise RequestError("this session has expired; reload the page", HTTPStatus.GONE)

@@ -93,7 +93,6 @@ class SessionState:
         return len(self.steps) - 1 - self.place
 
     def asking(self, values: Values) -> SessionState:
-        """Other values asked for."""
         return replace(self, wanted=wanted(self.surface, values))
 
     def showing(self, surface: Surface, certificate: Certificate | None = None) -> SessionState:
@@ -122,7 +121,6 @@ class SessionState:
         return replace(self.showing(self.steps[place]), place=place)
 
     def variant(self, number: int) -> Variant:
-        """A variant by its number."""
         if not 0 <= number < len(self.variants):
             raise OptionError(f"there is no variant {number + 1}", what="number", found=number)
         return self.variants[number]
@@ -211,12 +209,10 @@ class Session:
 
     @property
     def surface(self) -> Surface:
-        """The surface shown."""
         return self.now.surface
 
     @act()
     def state(self, state: SessionState, stop: Stop) -> SessionState:
-        """The present state."""
         return state
 
     @act(moves=True)

@@ -1,6 +1,5 @@
 """The reader of Surface Evolver datafiles: those that ``evolver`` and the program's ``dump`` write, and
-others whose sections list elements by number.
-"""
+others whose sections list elements by number."""
 
 from __future__ import annotations
 
@@ -26,9 +25,8 @@ from .text import TextSection, constant, kinds_of, line_ends, linear_expression
 WRITTEN = "written by pcmc"
 NUMBERED = r"(\d+)((?:[^\S\n]+-?\d+){})([^\n]*)"  # an element, the numbers of its parts, and the rest
 ROUNDING = 1e-12  # of the largest pressure: what is left of differences
-UNREADABLE = (
-    "string|quadratic|lagrange|simplex_representation|torus|torus_filled|symmetry_group|#include|#define"
-)
+UNREADABLE = "string|quadratic|lagrange|simplex_representation|torus|torus_filled|symmetry_group"
+UNREADABLE += "|#include|#define"
 
 
 def read(path: Path) -> MeshData:
@@ -148,8 +146,7 @@ def _pressures(
     file: _Datafile, face_ids: Ints
 ) -> tuple[Floats, dict[tuple[str, float], Ints], tuple[str, ...]]:
     """(m,) pressure along each face's normal: the sum over the bodies on its two sides; and the bodies of
-    prescribed volume: by number and volume, (m,) 1 or -1 where a face bounds them.
-    """
+    prescribed volume: by number and volume, (m,) 1 or -1 where a face bounds them."""
     pressure = np.zeros(len(face_ids))
     prescribed: dict[tuple[str, float], Ints] = {}
     if "bodies" not in file:

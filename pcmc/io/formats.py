@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -11,6 +10,7 @@ from typing import Any, NamedTuple
 
 from ..base.arrays import Floats
 from ..base.errors import FileError, unknown
+from ..base.files import PathLike
 from ..base.units import Units
 from ..surface import HeldCurve, Plane, Surface
 from .georeference import Georeference
@@ -141,7 +141,7 @@ def format_of(path: Path, known: Mapping[str, Format]) -> Format:
     return known[suffix]
 
 
-def metres_note(files: Iterable[str | os.PathLike[str]], unit: str) -> list[str]:
+def metres_note(files: Iterable[PathLike], unit: str) -> list[str]:
     """That files which are in metres take numbers without a unit as they are.
 
     >>> metres_note(["hall.obj", "hall.glb"], "")[0].split(";")[0]

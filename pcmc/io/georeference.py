@@ -45,9 +45,8 @@ class Georeference:
         """Refuse eastings, northings or a height that the surface's own coordinates have already."""
         metre = length_factor(units.length, "m")
         middle, far = metre * surface.vertices.mean(axis=0), FAR * metre * surface.size
-        for name, axis, found in zip(
-            ("eastings", "northings", "height"), "xyz", middle.tolist(), strict=True
-        ):
+        names = ("eastings", "northings", "height")
+        for name, axis, found in zip(names, "xyz", middle.tolist(), strict=True):
             given = getattr(self, name)
             if abs(given) > far and abs(found - given) < SAME * abs(given):
                 text = f"{name} = {given:.12g}: the surface is at {axis} = {found:.0f} m itself, and would be"

@@ -184,7 +184,7 @@ class _Model:
             "Area": ("IfcAreaMeasure", area),
             "Supports": ("IfcText", "".join(map(str, support_of(surface)[used].tolist()))),
         }
-        if patch.tension > 0.0:
+        if patch.tension > 0.0 and not patch.weight:  # with one it differs from place to place
             values["TargetMeanCurvature"] = ("IfcCurvatureMeasure", patch.target_curvature)
         self.add_properties("Pcmc_Patch", element, values, str(k))
         return element

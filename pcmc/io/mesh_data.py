@@ -242,9 +242,8 @@ def scaled_surface(surface: Surface, factor: float) -> Surface:
     """The surface in a new unit; ``factor`` new units are one old unit."""
     if factor == 1.0:
         return surface
-    parts: dict[str, Any] = {
-        f.name: in_new_unit(getattr(surface, f.name), factor) for f in fields(surface) if f.init
-    }
+    names = [f.name for f in fields(surface) if f.init]
+    parts: dict[str, Any] = {name: in_new_unit(getattr(surface, name), factor) for name in names}
     parts |= {name: in_new_unit(part, factor) for name, part in surface.given_supports._asdict().items()}
     parts |= {"vertices": factor * surface.vertices, "curves": in_new_unit(surface.held_curves, factor)}
     return Surface(**parts)

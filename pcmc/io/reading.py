@@ -1,6 +1,5 @@
 """Surfaces from files, with warnings about meshes of other programs: open seams, patches turned against each
-other or a wrong axis up can be solved, but probably give another roof than the one drawn.
-"""
+other or a wrong axis up can be solved, but probably give another roof than the one drawn."""
 
 from __future__ import annotations
 
@@ -18,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import Floats, Ints
 from ..base.errors import FileError, FileWarning, MissingExtra, OptionError, PcmcError, SurfaceError
-from ..base.files import as_path, check_regular, system_error
+from ..base.files import PathLike, as_path, check_regular, system_error
 from ..base.libraries import unreadable
 from ..base.units import MICROMETRES, Units
 from ..base.validate import choice, refuse
@@ -37,7 +36,7 @@ UPRIGHT = 0.9  # of the normal of that plane along x or y: more, and another axi
 
 
 def read(
-    path: str | os.PathLike[str],
+    path: PathLike,
     *,
     tensions: Mapping[str, float] | float | None = None,
     pressures: Mapping[str, float] | float | None = None,
@@ -88,7 +87,7 @@ def read(
     return _surface(path, converted(load(path), units), (tensions, pressures, fixed, on_plane, plane))
 
 
-def read_bare(path: str | os.PathLike[str], units: str = "", assumed: str = "") -> tuple[Surface, MeshData]:
+def read_bare(path: PathLike, units: str = "", assumed: str = "") -> tuple[Surface, MeshData]:
     """The Surface in a file and all its data; a note if it lacks supports, tensions or a unit.
 
     ``units`` is the unit of length wanted, by default the file's own; ``assumed`` that of a file without one;
@@ -111,7 +110,7 @@ def read_bare(path: str | os.PathLike[str], units: str = "", assumed: str = "") 
     return _surface(path, data, ()), data
 
 
-def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...]) -> Surface:
+def _surface(path: PathLike, data: MeshData, given: tuple[Any, ...]) -> Surface:
     """The Surface of a file's data; warns of all that was changed."""
     try:
         surface = to_surface(data, *given)
@@ -134,7 +133,7 @@ def _surface(path: str | os.PathLike[str], data: MeshData, given: tuple[Any, ...
     return surface
 
 
-def load(path: str | os.PathLike[str]) -> MeshData:
+def load(path: PathLike) -> MeshData:
     """Everything in a file, scalars and certificate too. Errors as in ``read``.
 
     >>> import tempfile
@@ -182,7 +181,7 @@ def format_opened(path: Path) -> Iterator[Format]:
         raise unreadable(path.suffix, error).in_file(path, FileError, str(path)) from error
 
 
-def import_warnings(data: MeshData, path: str | os.PathLike[str] = "FILE") -> tuple[str, ...]:
+def import_warnings(data: MeshData, path: PathLike = "FILE") -> tuple[str, ...]:
     """A sentence for each probable mistake in the file ``path``; none where the format has supports.
 
     >>> from pcmc import Patch

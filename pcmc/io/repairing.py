@@ -1,11 +1,9 @@
 """Meshes of other programs through MeshLab (pymeshlab, licence GPL), which repairs them and also reads .off,
-.3ds, .dae and .x3d.
-"""
+.3ds, .dae and .x3d."""
 
 from __future__ import annotations
 
 import math
-import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -17,9 +15,10 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import FileError, OptionError, PcmcError
-from ..base.files import as_path
+from ..base.files import PathLike, as_path
 from ..base.libraries import read_arrays, require, unreadable
 from ..base.units import NO_UNITS, Units
+from ..meshing.remeshing import MOST, remesh, triangles_for
 from ..surface import Plane, Surface
 from ..surface.geometry import face_areas
 from .mesh_data import MeshData, converted, to_surface, within
@@ -50,7 +49,7 @@ class Repaired:
 
 
 def repair(
-    path: str | os.PathLike[str],
+    path: PathLike,
     *,
     weld: float | None = None,
     holes: int = HOLES,
@@ -112,8 +111,6 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     size = float(np.linalg.norm(np.ptp(finite, axis=0))) if len(finite) else 0.0
     several = len(data.patches) > 1
     if edge_length is not None:
-        from ..meshing.remeshing import MOST, triangles_for  # takes long to import
-
         least = math.sqrt(np.nansum(triangles_for(face_areas(X[F]), np.ones(len(F)))) / MOST)
         if edge_length < least:
             better = f"use {1.01 * least:.2g} or more"
@@ -130,9 +127,8 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     surface = to_surface(MeshData(answer["points"], answer["faces"], patch, patches, plane=data.plane))
     changes = {done: number for done, number in answer["changes"].items() if number}
     given: dict[str, Any] = {"supports": data.support is not None and np.any(data.support)}
-    given |= {
-        key: getattr(data, key) or data.parts.get(key) for key in ("cables", "rooms", "planes", "lines")
-    }
+    for key in ("cables", "rooms", "planes", "lines"):
+        given[key] = getattr(data, key) or data.parts.get(key)
     given["curved elements"] = max(data.order, data.parts.get("order", 1)) > 1
     given["images"] = len(data.images) + len(data.parts.get("images", ())) > 0
     left_out = ", ".join(name for name, there in given.items() if there)
@@ -140,8 +136,6 @@ def _repaired(data: MeshData, weld: float | None, holes: int, edge_length: float
     notes = (*data.notes, *([f"left out: {left_out}{held}"] if left_out else []))
     if edge_length is not None:
         if several:
-            from ..meshing.remeshing import remesh  # needs the extra remesh
-
             surface = remesh(surface, edge_length)
         notes = (*notes, f"{len(F)} triangles became {surface.m}")
     return Repaired(surface, changes, notes, data.units, data.bare)

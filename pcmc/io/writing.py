@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import warnings
 from collections.abc import Mapping, Sequence
@@ -13,7 +12,7 @@ import numpy.typing as npt
 
 from ..base.arrays import Floats
 from ..base.errors import FileError, FileWarning, LostWarning, PcmcError
-from ..base.files import as_path, atomic_write, check_name, writing
+from ..base.files import PathLike, as_path, atomic_write, check_name, writing
 from ..base.units import Units, as_units, length_factor
 from ..base.validate import checked_name, choice, one_line, refuse
 from ..forces.pinching import standing_part
@@ -28,7 +27,7 @@ BESIDES = {"members": "members", "cable_areas": "sections of cables", "georefere
 
 
 def write(
-    path: str | os.PathLike[str],
+    path: PathLike,
     surface: Surface | Any,
     *,
     scalars: Mapping[str, Floats] | None = None,

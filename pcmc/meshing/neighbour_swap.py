@@ -53,7 +53,6 @@ class Film:
     def meeting(self, surface: Surface, when: str) -> str:
         """Names the patches that meet once the film has vanished: of a wall, the two of the roof at its ends.
 
-        >>> import numpy as np
         >>> from pcmc import Patch
         >>> floor = Surface(np.eye(3), [[0, 1, 2]], [0], [Patch("floor", 1.0)], fixed=range(3))
         >>> Film(0, np.empty((0, 2)), False, (0, 0), (0, 0), 0.0, 1.0).meeting(floor, "then")
@@ -161,8 +160,7 @@ def swap(surface: Surface, patch: str) -> tuple[Surface, str]:
         on it.
     """
     film, mesh, target = collapsed(surface, patch)
-    curve = target[film.pairs[:, 0]]
-    curve = curve[np.sort(np.unique(curve, return_index=True)[1])]
+    curve = np.array([*dict.fromkeys(target[film.pairs[:, 0]].tolist())])  # in order, each vertex once
     edges = np.stack([curve, np.roll(curve, -1)], axis=1)[: None if film.closed else -1]
     edge = EDGE * float(np.sqrt(face_areas(mesh.corners(surface)[mesh.beside(film, edges)]).mean()))
     way, patches = _opening(surface, film, mesh, edges), list(surface.patches)

@@ -83,19 +83,6 @@ def edge_lengths(surface: Surface) -> Floats:
     return segment_lengths(surface.vertices, surface.topology.sides)
 
 
-def towards_star_centres(surface: Surface, X: Floats, kind: Ints, curve: Ints, beside: Ints) -> Floats:
-    """Move (n,3) of each vertex halfway towards a better-shaped star, before any projection.
-
-    Inside a sheet (``kind`` (n,)) towards the area-weighted mean of its triangles' centroids, at the
-    vertices ``curve`` (c,) towards the middle of their neighbours ``beside`` (c,2), elsewhere not at
-    all; fixed vertices stay and sliding ones keep to Π.
-    """
-    move = _to_star_centres(X, surface.faces)
-    move[kind != SHEET] = 0.0
-    move[curve] = X[beside].mean(axis=1) - X[curve]
-    return apply_supports(surface, 0.5 * move, X)
-
-
 @compiled
 def _to_star_centres(X: Floats, F: Ints) -> Floats:
     """(n,3) from each vertex to the area-weighted mean of its triangles' centroids; zero where no area is."""
@@ -117,14 +104,18 @@ def redistribute(part: StandingPart, X: Floats, aim: float, *, slide: bool) -> t
     """The best of a few sweeps of redistribution, (n,3), and the quality of its worst triangle.
 
     Sweeps end where that is at least ``aim``; triangles of walls that can pinch do not count. Each vertex
-    moves from X (n,3) towards the middle of its star, without the part in the motion space, which would
-    change the shape; walls follow their crest. With ``slide``, junction vertices at rest on Π slide too.
-    Junctions that can come down on a held bottom stay over the vertices of that.
+    moves from X (n,3) halfway towards the middle of its star, on a curve of its two neighbours there, as far
+    as its support lets it and without the part in the motion space, which would change the shape; walls
+    follow their crest. With ``slide``, junction vertices at rest on Π slide too. Junctions that can come down
+    on a held bottom stay over the vertices of that.
     """
     surface, classes, faces = part.surface, part.classes, part.quality_faces
     best, worst = X, worst_quality(X, faces)
     for _ in range(SWEEPS):
-        move = towards_star_centres(surface, X, classes.kind, classes.curve, classes.beside)
+        move = _to_star_centres(X, surface.faces)
+        move[classes.kind != SHEET] = 0.0
+        move[classes.curve] = X[classes.beside].mean(axis=1) - X[classes.curve]
+        move = apply_supports(surface, 0.5 * move, X)
         if not slide:
             move[part.resting] = 0.0
         move[part.walls.held] = 0.0  # these stay over their bottom vertices

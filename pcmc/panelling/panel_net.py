@@ -129,9 +129,6 @@ class PanelNet:
         distance = validate.number("distance", distance)
         return self.points + distance * (self.normals if torsion else self.axes)
 
-    def __str__(self) -> str:
-        return self.text()
-
     def text(self, units: Units = NO_UNITS) -> str:
         """Totals, with the units of the numbers if they are given."""
         table, beams, nodes = self.panels, self.beams, self.nodes
@@ -166,6 +163,8 @@ class PanelNet:
             text = f"{len(flat)} panels have next to no area, as panel {flat[0]}: choose another size"
             rows["slivers"] = text
         return head_text(self.certificate, units, rows)
+
+    __str__ = text
 
 
 def panel_net(
@@ -230,7 +229,6 @@ def check_grid(pattern: str, direction: float, owner: str = "") -> None:
 def _sheet_net(
     surface: Surface, patch: int, faces: Ints, sheet: SheetMesh, size: float, pattern: str, direction: float
 ) -> SheetNet:
-    """A sheet with the coordinates of its net."""
     name = surface.patches[patch].name
     most = LARGEST * float(np.ptp(sheet.X, axis=0).max())
     if size > most:

@@ -100,9 +100,6 @@ class Panels:
         family = self.panels.set_index("face")["family"]
         return family.reindex(range(self.surface.m)).to_numpy(dtype=float)
 
-    def __str__(self) -> str:
-        return self.text()
-
     def text(self, units: Units = NO_UNITS) -> str:
         """Totals and the largest families, with the units of the numbers if they are given."""
         total, angles = self.edge_totals, self.edges["dihedral"].dropna()
@@ -119,6 +116,8 @@ class Panels:
         table = self.families.head(SHOWN).to_string(index=False, float_format=lambda x: f"{x:.5g}")
         rest = self.count - SHOWN
         return f"{head}\n\n{table}" + (f"\n... {rest} more families" if rest > 0 else "")
+
+    __str__ = text
 
 
 def panels(

@@ -35,9 +35,7 @@ RANK = 1e-10  # smaller singular values, as shares of the largest, are none: reg
 MOST_RINGS = 4  # of neighbours that are taken together
 KINK = np.cos(np.radians(35.0))  # a boundary that turns by more has a corner
 NUDGE = 1e-6  # of a step: a vertex is at least so far from every line
-ALIGNED = np.radians(
-    10.0
-)  # from a principal direction on half of a curve: less, and it is a line of curvature
+ALIGNED = np.radians(10.0)  # from a principal direction, on half of a curve that is a line of curvature
 ROUND = 0.05  # of the mean curvature: where (κ₁ - κ₂)/2 is smaller on half of a sheet, it is part of a sphere
 FLAT = 1e-6  # curvature times size
 STRETCHES, SHIFTS = np.linspace(0.8, 1.25, 46), np.arange(0.0, 1.0, 0.025)  # of lines, that are tried
@@ -55,7 +53,6 @@ class SheetMesh:
 
     @cached_property
     def topology(self) -> Topology:
-        """Edges of the sheet."""
         return topology(self.F, np.zeros(len(self.F), dtype=np.int64), len(self.X))
 
     @cached_property

@@ -3,33 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError, unknown
-from .figure import (
-    CURVES,
-    INK,
-    SMALL,
-    TEXT,
-    Image,
-    Path,
-    color_bar,
-    color_map,
-    finish,
-    fit_height,
-    grid,
-    new,
-    overlap_style,
-    style,
-)
-
-if TYPE_CHECKING:
-    import pandas as pd
+from ..base.files import PathLike
+from .colours import color_bar, color_map
+from .figure import CURVES, INK, SMALL, TEXT, finish, fit_height, grid, new, overlap_style, style
+from .scene import Image
 
 SCALES = ("linear", "log")
 MARKERS = "osD^vPX"
@@ -41,7 +27,7 @@ WIDEST_BESIDE = 0.4  # of a figure's width: a wider legend stays inside the axes
 
 def lines(
     curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]],
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     x: str = "",
     y: str = "",
@@ -102,7 +88,7 @@ def _plain_ticks(axis: Any) -> None:
 
 def histories(
     frames: Mapping[str, pd.DataFrame],
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     y: str = "energy",
     x: str | None = None,
@@ -137,7 +123,7 @@ def histories(
 
 def convergence(
     curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]],
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     x: str = "edge length",
     y: str = "error",
@@ -178,7 +164,7 @@ def heatmap(
     x: npt.ArrayLike,
     y: npt.ArrayLike,
     tables: Mapping[str, npt.ArrayLike],
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     marks: Mapping[str, npt.ArrayLike] | None = None,
     xlabel: str = "",
@@ -237,7 +223,7 @@ def heatmap(
 
 def diagram(
     branches: Mapping[str, Any],
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     x: str = "parameter",
     y: str = "height",

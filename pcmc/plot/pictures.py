@@ -13,27 +13,14 @@ import numpy.typing as npt
 from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, OptionError
+from ..base.files import PathLike
 from ..base.units import NO_UNITS, Units
 from ..certificate.forces import Forces
 from ..surface import Surface
 from ..surface.geometry import area_vectors
-from .figure import (
-    DPI,
-    INK,
-    SMALL,
-    TEXT,
-    Image,
-    Path,
-    add_picture_legend,
-    color_scale,
-    finish,
-    fit_height,
-    frames_of,
-    grid,
-    new,
-    png,
-)
-from .scene import Camera, Rendering, mean_edge, paint, scene, view_of
+from .colours import add_picture_legend, color_scale
+from .figure import DPI, INK, SMALL, TEXT, finish, fit_height, grid, new, png
+from .scene import Camera, Image, Rendering, frames_of, mean_edge, paint, scene, view_of
 
 if TYPE_CHECKING:
     from .. import PanelNet, Panels
@@ -52,7 +39,7 @@ AT_POINTS = "#2166AC"
 
 def draw(
     surface: Surface,
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     view: ViewName = "diagonal",
     scalars: npt.ArrayLike | None = None,
@@ -101,7 +88,7 @@ def draw(
 
 def panel(
     surfaces: Sequence[Surface],
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     titles: Sequence[str] = (),
     columns: int | None = None,
@@ -148,7 +135,7 @@ def panel(
 
 def compose(
     drawings: Sequence[Rendering],
-    path: Path | None,
+    path: PathLike | None,
     columns: int,
     width: int,
     *,
@@ -209,7 +196,7 @@ def compose(
     return finish(figure, path)
 
 
-def families(schedule: Panels, path: Path | None = None, **options: Any) -> Image:
+def families(schedule: Panels, path: PathLike | None = None, **options: Any) -> Image:
     """The panels of a roof that ``pcmc.panels`` returns, each in the colour of its family.
 
     ``options`` are as in ``draw``, such as ``view`` and ``width``.
@@ -229,7 +216,7 @@ def families(schedule: Panels, path: Path | None = None, **options: Any) -> Imag
     return draw(schedule.surface, path, scalars=schedule.family_of_face, patches=names, **look)
 
 
-def panel_planarity(net: PanelNet, path: Path | None = None, **options: Any) -> Image:
+def panel_planarity(net: PanelNet, path: PathLike | None = None, **options: Any) -> Image:
     """The panels of a net that ``pcmc.panel_net`` returns, coloured by how far they are from planar.
 
     ``options`` are as in ``draw``, such as ``view`` and ``width``.
@@ -248,7 +235,7 @@ def panel_planarity(net: PanelNet, path: Path | None = None, **options: Any) -> 
 def vectors(
     surface: Surface,
     field: npt.ArrayLike,
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     length: float = 0.12,
     most: int = 400,
@@ -301,7 +288,7 @@ def vectors(
 
 
 def reactions(
-    surface: Surface, path: Path | None = None, *, units: Units = NO_UNITS, **options: Any
+    surface: Surface, path: PathLike | None = None, *, units: Units = NO_UNITS, **options: Any
 ) -> Image:
     """Arrows of the reactions: along lines force per length, in blue the forces at single points.
 

@@ -32,6 +32,8 @@ LINE, MESH_LINE = "#303030", "#585858"
 
 VIEWS = {"diagonal": (-60.0, 28.0), "elevation": (-90.0, 0.0), "plan": (-90.0, 90.0)}
 CELLS_UP_TO = 20_000  # triangles; above, a vertex's own cell is smaller than a pixel or two
+MARGIN = 10.0  # pixels around each picture, for lines and dots that stick out
+TALLEST = 1.1  # height of a picture at most, as a part of its width
 LIFT = 2e-3  # of the size: lines and dots stand this much before the surface they lie on
 
 
@@ -161,8 +163,7 @@ def _nearest(count: int, parts: Ints, near: Floats) -> Floats:
 
 def _light(surface: Surface, shown: Bools, view: Camera, strength: float, smooth: bool) -> Floats:
     """(t,3) brightness at the corners of a matt sheet seen from either side, lit from above the left; normals
-    are the faces', or if ``smooth`` their means at each vertex in its patch.
-    """
+    are the faces', or if ``smooth`` their means at each vertex in its patch."""
     F = surface.faces
     area = area_vectors(surface.vertices[F])
     normal = np.repeat(area[:, None], 3, axis=1)
@@ -215,6 +216,22 @@ class Frame:
         bottom = (figure.height - round(figure.height - box.y1) - self.size[1]) / figure.height
         axes.set_position((left, bottom, self.size[0] / figure.width, self.size[1] / figure.height))
         axes.imshow(image, extent=(self.low[0], right, self.low[1], top), aspect="auto")
+
+
+def frames_of(points: Sequence[Floats], columns: int, width: int, one_scale: bool = True) -> list[Frame]:
+    """Frames around the given points (k,2), row by row; those of a row are of one height."""
+    spans, wide = np.array([np.ptp(p, axis=0) for p in points]), width // columns
+    room = np.array([wide, TALLEST * wide]) - 2 * MARGIN
+    scales = (room / np.maximum(spans, 1e-9 * spans.max())).min(axis=1)
+    if one_scale:
+        scales[:] = scales.min()
+    frames = []
+    for k, (corners, span, scale) in enumerate(zip(points, spans, scales.tolist(), strict=True)):
+        row = slice(k - k % columns, k - k % columns + columns)
+        high = math.ceil((spans[row, 1] * scales[row]).max() + 2 * MARGIN)
+        low = corners.min(axis=0) - np.array([(wide / scale - span[0]) / 2.0, MARGIN / scale])
+        frames.append(Frame((wide, high), low, scale))
+    return frames
 
 
 RENDERERS = ("auto", "pyvista", "matplotlib")

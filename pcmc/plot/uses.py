@@ -9,12 +9,14 @@ import numpy as np
 
 from ..base import validate
 from ..base.errors import OptionError, unknown
+from ..base.files import PathLike
 from ..base.units import NO_UNITS, Units
 from ..forces.rooms import energy_at_volumes
 from ..surface import Patch, Surface
 from .curves import add_branches, add_legend, label_axes
-from .figure import CURVES, INK, SMALL, TEXT, Image, Path, finish, grid, new, style
+from .figure import CURVES, INK, SMALL, TEXT, finish, grid, new, style
 from .pictures import RED, draw, panel
+from .scene import Image
 
 if TYPE_CHECKING:
     from ..cloth import CuttingPattern
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from ..structure.analysis import Case
 
 
-def strains(pattern: CuttingPattern, path: Path | None = None, **options: Any) -> Image:
+def strains(pattern: CuttingPattern, path: PathLike | None = None, **options: Any) -> Image:
     """The strips of a cutting pattern on the roof, coloured by the larger principal strain of the cloth.
 
     ``options`` are as in ``draw``, such as ``view`` and ``width``.
@@ -57,7 +59,7 @@ SHOWN = ("deflection", "least force")
 
 def under_load(
     analysis: Analysis,
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     what: str = "deflection",
     cases: tuple[str, ...] = (),
@@ -94,7 +96,7 @@ def under_load(
 
 def member_forces(
     analysis: Analysis,
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     cases: tuple[str, ...] = (),
     members: tuple[str, ...] = (),
@@ -178,7 +180,7 @@ PICTURE = 420  # pixels across a picture
 
 def equilibria(
     found: Equilibria,
-    path: Path | None = None,
+    path: PathLike | None = None,
     *,
     along: str | None = None,
     y: str = "height",

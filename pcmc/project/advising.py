@@ -95,9 +95,8 @@ def _mended(project: Project, plan: Plan, outcome: Outcome) -> Mended:
         rings = ring_lines(masts, share, drawn=project.drawing is not None)
         for old, new in zip(plan.patches, changed.patches, strict=True) if project.drawing is None else ():
             if old.at != new.at:  # it was inside a ring
-                rings.append(
-                    f"[plan.patches] {toml_key(new.name)}: at = {toml(new.at)}  (now {toml(old.at)})"
-                )
+                change = f"at = {toml(new.at)}  (now {toml(old.at)})"
+                rings.append(f"[plan.patches] {toml_key(new.name)}: {change}")
         return Mended(changed, True, sail is not None, rings)
     better, certificate = plan, outcome.certificate
     for _ in range(TRIES):

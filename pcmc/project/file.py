@@ -272,6 +272,8 @@ def project_of(
         named = [] if plan is None else [p.member for p in (*plan.dividers, *plan.holes) if p.member]
         if structure is not None:
             check_members(structure.members, plan)
+            if structure.enclosed is not None and plan is not None:  # a mesh may have units of its own
+                structure.enclosed.outside(units)
             for name, member in structure.members.items():
                 if name not in named and not any(member.get(key) for key in ("on", "along", "bars")):
                     text = f"member {name!r} is nowhere; name it in a divider or a hole of the plan, give it"

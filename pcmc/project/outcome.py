@@ -162,11 +162,14 @@ class Outcome:
     @property
     def remarks(self) -> list[str]:
         """The notes, and whose the targets are where the whole is shown."""
-        targets = () if self.project is None else self.project.targets
-        if not (self.unfold and any(target.quantity in EXTENSIVE for target in targets)):
-            return [*self.notes]
         part = "targets of areas, volumes and lengths are those of the part between the mirror planes"
-        return [*self.notes, part]
+        return [*self.notes, *([part] if self._of_the_part else [])]
+
+    @property
+    def _of_the_part(self) -> list[str]:
+        """The labels of targets that are not those of the whole, where that is shown."""
+        targets = self.project.targets if self.unfold and self.project is not None else ()
+        return [target.label for target in targets if target.quantity in EXTENSIVE]
 
     @property
     def mark(self) -> str:
@@ -234,7 +237,8 @@ class Outcome:
         about |= {"mesh_check": self.mesh_check, "mesh_failure": self.mesh_failure, "margins": self.margins}
         about |= {"files": files, "date": output.date, "figures": self.figures}
         if self.design is not None:
-            about["targets"] = self.design.targets
+            names = {label: f"{label} (of the part)" for label in self._of_the_part}
+            about["targets"] = self.design.targets.rename(names)
         if project is not None and project.verify:
             about["theorem"] = self.theorem
         if project is not None and project.pattern is not None:
@@ -270,9 +274,8 @@ class Outcome:
         if self.unfold:
             cloth = wanted.of_whole(self.surface, surface)
             structure = structure and structure.of_whole(self.surface, surface, None)
-        cut = partial(
-            cutting_pattern_of, surface, of_material(cloth, structure, surface), anyway, certificate
-        )
+        cloth = of_material(cloth, structure, surface)
+        cut = partial(cutting_pattern_of, surface, cloth, anyway, certificate)
         own = project is not None and wanted is project.pattern
         return self._once("cutting pattern", cut) if own else cut()
 

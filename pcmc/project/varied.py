@@ -37,6 +37,7 @@ from .start import start_of
 
 AXES = ("x", "y", "z")
 CABLE = "cable "  # before the name of a cable, where a patch has the same
+LATER = ("structure", "pattern", "output")  # sections that no shape depends on
 NUMERIC = ("a number", "a whole number", WALL)  # kinds of keys
 KeyPath = tuple[str | int, ...]
 Item = tuple[tuple[str, ...], KeyPath, Any]  # names, path and value of something in a file
@@ -158,7 +159,10 @@ class _Source(NamedTuple):
                 keys = [k for k, at in self.keys.items() if isinstance(at[-1], str) and at[1] != "patches"]
                 near = get_close_matches(name, self.keys, n=1, cutoff=0.8)
                 names = tuple(dict.fromkeys([*known, *keys, *near]))
-                raise OptionError(f"{self.path}: {unknown('number', name, names)}", what=name, expected=names)
+                text, section = unknown("number", name, names), name.partition(".")[0]
+                if section in LATER:
+                    text = f"{name}: no shape depends on [{section}]; sweep another number"
+                raise OptionError(f"{self.path}: {text}", what=name, expected=names)
             kind, part = known[name]
             parts, field, _ = KINDS[kind]
             same = [f"{table}.{parts}.{part}.{field}" for table in ("plan", "mesh")]
@@ -184,14 +188,16 @@ def with_loads(surface: Surface, given: Mapping[str, Mapping[str, float]]) -> Su
 
 
 def numbers_by_name(data: Mapping[str, Any]) -> dict[str, KeyPath]:
-    """The numbers of a project: the dotted name of each, and its path in the data; then those it may have.
+    """The numbers that a shape may depend on: the dotted name of each, and its path in the data of a project;
+    then those it may have.
 
     Entries of a list are named by their key "name" if they have one, otherwise by their number from 1.
 
     >>> list(numbers_by_name({"plan": {"edge": "free", "holes": [{"name": "yard", "cable": 2.0}, [3]]}}))[:3]
     ['plan.holes.yard.cable', 'plan.holes.2.1', 'plan.gap']
     """
-    items: list[Item] = list(_items({**data, "solve": data.get("solve", {})}, (), ()))
+    shaping = {key: value for key, value in data.items() if key not in LATER}
+    items: list[Item] = list(_items({**shaping, "solve": data.get("solve", {})}, (), ()))
     given = {".".join(n): p for n, p, v in items if isinstance(v, int | float) and not isinstance(v, bool)}
     method = str(data.get("solve", {}).get("method", "newton"))
     sections = {section.name: section for section in (*main_sections(), solve_section(method))}

@@ -228,8 +228,7 @@ def check_outputs(
 ) -> None:
     """Refuse, before any work, paths that cannot be written, as a library is missing, too; and those of a
     command's own ``inputs``, also by links and other ways to write them. The folder ``made`` may be missing.
-    With the paths that are ``pictures``, what draws these and documents must be there, too.
-    """
+    With the paths that are ``pictures``, what draws these and documents must be there, too."""
     paths = list(paths)
     if pictures is not None:
         drawn = {Path(picture) for picture in pictures if picture is not None}

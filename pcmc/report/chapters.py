@@ -33,8 +33,6 @@ SIGNS = (
     "pull of the sheets is the load, in the deformed shape. Buckling is "
     "the factor on the forces along a member at which it buckles alone, without the sheets that hold it."
 )
-
-
 ABOUT_COLUMNS = (
     "They follow from the forces of the supports by statics; N is above 0 in tension. A stay that would be "
     "pressed is left out, with N = 0. Euler's load is that of a column with hinged ends. Their own weight is "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -12,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from ..accuracy import Margin, MeshCheck
-from ..base.files import atomic_write, suffix_of, writing
+from ..base.files import PathLike, atomic_write, suffix_of, writing
 from ..base.units import Units, as_units, expect_length
 from ..certificate import Certificate, quantities
 from ..certificate.certificate import certified
@@ -58,7 +57,7 @@ class RoofReport:
     pattern: CuttingPattern | None = None
     files: Mapping[str, str] = field(default_factory=dict)
 
-    def write(self, path: str | os.PathLike[str]) -> Path:
+    def write(self, path: PathLike) -> Path:
         """Write the report as a PDF file; the same report gives the same bytes.
 
         FileError for another suffix than .pdf, or a file that cannot be written.

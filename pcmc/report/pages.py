@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 from xml.sax.saxutils import escape
 
+from reportlab import platypus
 from reportlab.lib.colors import HexColor
 from reportlab.lib.enums import TA_LEFT, TA_RIGHT
 from reportlab.lib.pagesizes import A4
@@ -15,16 +16,6 @@ from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
 from reportlab.pdfbase.pdfmetrics import stringWidth
 from reportlab.pdfgen.canvas import Canvas
-from reportlab.platypus import (
-    CondPageBreak,
-    Flowable,
-    Image,
-    KeepTogether,
-    PageBreak,
-    Paragraph,
-    SimpleDocTemplate,
-)
-from reportlab.platypus import Table as Grid
 
 from ..drawings.sheet import BOLD, FONT, paint_sheet
 from .plan import PaperPlan
@@ -71,7 +62,7 @@ def pdf(blocks: Sequence[Block], title: str, foot: str, mark: str) -> bytes:
     stream = io.BytesIO()
     margins = {"leftMargin": SIDE, "rightMargin": SIDE, "topMargin": TOP, "bottomMargin": BOTTOM}
     about = {"title": title, "author": "pcmc", "creator": "pcmc", "invariant": 1, "lang": "en"}
-    document = SimpleDocTemplate(stream, pagesize=A4, **about, **margins)
+    document = platypus.SimpleDocTemplate(stream, pagesize=A4, **about, **margins)
     document.build([part for block in blocks for part in _flowables(block)], canvasmaker=Numbered)
     return stream.getvalue()
 
@@ -100,7 +91,8 @@ def _cut(text: str, width: float) -> str:
 
 def _flowables(block: Block) -> list[Any]:
     if isinstance(block, Heading):
-        return [PageBreak() if block.new_page else CondPageBreak(FOLLOWING), _paragraph(block.text, HEADING)]
+        room = platypus.PageBreak() if block.new_page else platypus.CondPageBreak(FOLLOWING)
+        return [room, _paragraph(block.text, HEADING)]
     if isinstance(block, str):
         return [_paragraph(block, TEXT)]
     if isinstance(block, PaperPlan):
@@ -122,14 +114,14 @@ def _flowables(block: Block) -> list[Any]:
         look += [("LINEBELOW", (0, 0), (-1, 0), 0.6, HexColor(INK))] * headed
         widths = [width * min(WIDTH / sum(widths), 1.0) for width in widths]
         place: dict[str, Any] = {"hAlign": "LEFT", "spaceBefore": 4.0, "spaceAfter": 8.0}
-        return [*title, Grid(cells, colWidths=widths, repeatRows=int(headed), style=look, **place)]
-    image = Image(io.BytesIO(block.png))
+        return [*title, platypus.Table(cells, colWidths=widths, repeatRows=int(headed), style=look, **place)]
+    image = platypus.Image(io.BytesIO(block.png))
     share = min(WIDTH / image.imageWidth, TALLEST / image.imageHeight)
     image.drawWidth, image.drawHeight = share * image.imageWidth, share * image.imageHeight
-    return [KeepTogether([*title, image])]
+    return [platypus.KeepTogether([*title, image])]
 
 
-class _Plan(Flowable):
+class _Plan(platypus.Flowable):
     """A plan to scale, in the middle between the margins."""
 
     hAlign = "CENTER"
@@ -157,4 +149,4 @@ def _widths(rows: Sequence[Sequence[str]], size: float) -> list[float]:
 
 
 def _paragraph(text: str, style: Any) -> Any:
-    return Paragraph(escape(text), style)
+    return platypus.Paragraph(escape(text), style)

@@ -86,10 +86,8 @@ def sentence(text: str) -> str:
 def about_forces(units: Units, certificate: Certificate) -> str:
     """How the signs and units of the tables are meant, and how far reactions differ from loads."""
     force = units.force or "the unit of force of the tensions"
-    text = (
-        f"Lengths are in {units.length}, forces in {force}. Reactions are the forces of the supports on the"
-    )
-    text += " roof: z is up, so a negative z holds the roof down."
+    text = f"Lengths are in {units.length}, forces in {force}. Reactions are the forces of the supports on"
+    text += " the roof: z is up, so a negative z holds the roof down."
     if len(certificate.supports) and (share := certificate.balance["force_share"].iloc[-1]) > SEEN:
         text += f" Their sum differs from that of the loads by {100.0 * share:.1g} %, the remainder of the"
         text += " balance: the mesh leaves it along its sheets, and finer triangles make it smaller."

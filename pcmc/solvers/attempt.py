@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..base import validate
 from ..base.errors import OptionError
 from ..base.tolerances import AT_REST, COLLAPSED, NOISE, POOR, ROUNDED_REST, SHRUNK
+from ..base.validate import check_options, choice, integer, number, option
 from ..forces.functional import patch_areas
 from ..forces.loose_parts import patch_residuals
 from ..meshing.quality import worst_quality
@@ -55,22 +55,17 @@ class NewtonOptions:
         rest on Π, they stay flat.
     """
 
-    tolerance: float = 1e-12
-    iterations: int = 200
-    target: str = "minimum"
-    levels: int = 0
-    min_quality: float = 0.45
-    inflation: float = 10.0
+    tolerance: float = option(1e-12, number, above=0.0)
+    iterations: int = option(200, integer)
+    target: str = option("minimum", choice, known=TARGETS)
+    levels: int = option(0, integer)
+    min_quality: float = option(0.45, number, least=0.0, below=1.0)
+    inflation: float = option(10.0, number, above=1.0)
     backend: str | None = None
     order: int | None = None
 
     def __post_init__(self) -> None:
-        validate.number("tolerance", self.tolerance, above=0.0)
-        validate.integer("iterations", self.iterations)
-        validate.choice("target", self.target, TARGETS)
-        validate.integer("levels", self.levels)
-        validate.number("min_quality", self.min_quality, least=0.0, below=1.0)
-        validate.number("inflation", self.inflation, above=1.0)
+        check_options(self)
         if self.order is not None:
             known_order(self.order, OptionError)
 
@@ -123,7 +118,7 @@ class NewtonRun:
 
     def run(self) -> NewtonRun:
         """Step until the end, or on from there; ``status`` then gives the reason."""
-        self.status = until_stopped(self._iterate)
+        self.status = until_stopped(self._iterate, Status.STOPPED)
         if self.status is Status.STOPPED:  # perhaps in the middle of a step
             X, version = self._shown
             self.state.go_to(X if version == self.state.version else self.state.at.X)
@@ -195,14 +190,13 @@ class NewtonRun:
 
     def _at_rest(self) -> bool:
         """Whether the residual is below the tolerance, or as low as rounding lets it become."""
-        residual, rounding = self.state.at.residual, self.state.rounding
-        no_progress = self.stuck or self.steps_since_best > PATIENCE
-        if residual <= self.options.tolerance:
+        at, rounding = self.state.at, self.state.rounding
+        if at.residual <= self.options.tolerance:
             return True
-        if no_progress:
-            return residual <= max(ROUNDED_REST, NOISE * rounding)
-        at, least = self.state.at, min(rounding, SURE * AT_REST)
-        if residual > least:
+        if self.stuck or self.steps_since_best > PATIENCE:
+            return at.residual <= max(ROUNDED_REST, NOISE * rounding)
+        least = min(rounding, SURE * AT_REST)
+        if at.residual > least:
             return False
         own = patch_residuals(at.shape, at.classes, at.unbalanced)  # weak ones hide in the residual
         return bool(own.max() <= least)

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Bools, Floats
-from ..base.compiled import blocks, compiled
+from ..base.arrays import Floats
+from ..base.compiled import blocks
 from ..base.tolerances import FORCE_ROUNDING
 from ..forces import triangles
 from ..forces.elements import add_values, energy_mesh
@@ -16,7 +16,8 @@ from ..forces.functional import elements, total
 from ..forces.motion_space import force_scale
 from ..surface import Surface
 from ..surface.checks import reachable
-from ..surface.geometry import accumulate, bounding_size, dot, point, scaled, vector
+from ..surface.geometry import bounding_size
+from ..surface.supports import project
 from .result import Status
 
 
@@ -69,14 +70,12 @@ class Evaluator:
         self.count, self._tolerance = 0, converged_below(surface, tolerance)
         self._largest = inflation * surface.size
         self._mesh = energy_mesh(surface)
-        self._supports = surface.fixed, surface.on_plane, np.array(surface.plane.normal)
-        self._others = tuple((plane, mask) for plane, mask in surface.sliding if mask is not surface.on_plane)
+        self._admissible = surface.admissible
         self._surface = surface
         self._more = any(True for _ in elements(surface, surface.vertices))
         self._single = len(blocks(surface.m)) == 1 and not (self._mesh.curved or surface.heavy)
 
     def row(self, point: Point) -> dict[str, Any]:
-        """The point as a row of a solver's history."""
         return {"evaluation": self.count, "energy": point.energy, "gradient_squared": point.squared}
 
     def ending(self, point: Point) -> Status | None:
@@ -96,22 +95,6 @@ class Evaluator:
         else:
             sums, G = triangles.totals_and_gradient(self._mesh, X)
         further = add_values(elements(self._surface, X), G) if self._more else 0.0
-        for plane, mask in self._others:
-            G[mask] = plane.along(G[mask])
-        squared = _apply_supports(G, *self._supports)
+        squared = project(self._admissible, G)
         with np.errstate(all="ignore"):
             return Point(X, total(self._mesh, sums) + further, G, squared)
-
-
-@compiled
-def _apply_supports(G: Floats, fixed: Bools, sliding: Bools, normal: Floats) -> float:
-    """Remove from G (n,3) the forces that the supports carry, Eq. (19), in place; return its squared sum."""
-    squared = 0.0
-    for v in range(len(G)):
-        if fixed[v]:
-            G[v, 0] = G[v, 1] = G[v, 2] = 0.0
-        elif sliding[v]:
-            n = vector(normal)
-            accumulate(G, v, scaled(-dot(point(G, v), n), n))
-        squared += dot(point(G, v), point(G, v))
-    return squared

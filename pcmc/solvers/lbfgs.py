@@ -10,9 +10,9 @@ from typing import Any
 import nlopt
 import numpy as np
 
-from ..base import validate
 from ..base.arrays import Floats
 from ..base.tolerances import COLLAPSED
+from ..base.validate import check_options, integer, number, option
 from ..meshing.quality import worst_quality
 from ..surface import Surface
 from .evaluate import Evaluator, Point
@@ -39,17 +39,11 @@ class LbfgsOptions:
     inflation : diverged when the bounding box is more than this many times its first diagonal.
     """
 
-    tolerance: float | None = 1e-8
-    evaluations: int = 2000
-    memory: int = 10
-    inflation: float = 10.0
-
-    def __post_init__(self) -> None:
-        if self.tolerance is not None:
-            validate.number("tolerance", self.tolerance, least=0.0)
-        validate.integer("evaluations", self.evaluations, least=1)
-        validate.integer("memory", self.memory, most=1000)
-        validate.number("inflation", self.inflation, above=1.0)
+    tolerance: float | None = option(1e-8, number, least=0.0)
+    evaluations: int = option(2000, integer, least=1)
+    memory: int = option(10, integer, most=1000)
+    inflation: float = option(10.0, number, above=1.0)
+    __post_init__ = check_options
 
 
 class Coordinates:
@@ -181,7 +175,7 @@ def lbfgs(surface: Surface, options: LbfgsOptions | None = None, callback: Callb
     'lbfgs: converged: the residual is below its tolerance'
     """
     objective = Objective(surface, options or LbfgsOptions(), callback)
-    status = until_stopped(objective.minimize)
+    status = until_stopped(objective.minimize, Status.STOPPED)
     evaluate, best, rows = objective.evaluate, objective.best, objective.rows
     if best is None or (rows[-1]["energy"], rows[-1]["gradient_squared"]) != (best.energy, best.squared):
         best = evaluate(surface.vertices if best is None else best.X)

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import OptionError
+from ..base.validate import check_options, choice, flag, integer, number, option
 from ..surface import Surface
 from .evaluate import Evaluator, Point
 from .result import Callback, Progress, Result, Status, until_stopped
@@ -39,36 +39,25 @@ class NesterovOptions:
     inflation : diverged when the bounding box is more than this many times its first diagonal.
     """
 
-    t0: float = 0.01
-    gamma: float = 0.9
-    xi: float = 0.2
-    tau: float = 0.5
-    floor_power: int = 5
-    momentum: bool = True
-    line_search: bool = True
-    armijo: str = "printed"
-    tolerance: float | None = 1e-8
-    iterations: int = 1000
-    inflation: float = 10.0
+    t0: float = option(0.01, number, above=0.0)
+    gamma: float = option(0.9, number, least=0.0, below=1.0)
+    xi: float = option(0.2, number, least=0.0)
+    tau: float = option(0.5, number, above=0.0, below=1.0)
+    floor_power: int = option(5, integer)
+    momentum: bool = option(True, flag)
+    line_search: bool = option(True, flag)
+    armijo: str = option("printed", choice, known=("printed", "sufficient"))
+    tolerance: float | None = option(1e-8, number, least=0.0)
+    iterations: int = option(1000, integer)
+    inflation: float = option(10.0, number, above=1.0)
 
     def __post_init__(self) -> None:
-        validate.number("t0", self.t0, above=0.0)
-        validate.number("gamma", self.gamma, least=0.0, below=1.0)
-        validate.number("xi", self.xi, least=0.0)
-        validate.number("tau", self.tau, above=0.0, below=1.0)
-        validate.integer("floor_power", self.floor_power)
-        validate.flag("momentum", self.momentum)
-        validate.flag("line_search", self.line_search)
+        check_options(self)
         for switch, names in (("momentum", ["gamma"]), ("line_search", ["tau", "floor_power"])):
             for name in () if getattr(self, switch) else names:
                 if getattr(self, name) != getattr(NesterovOptions, name):
                     text = f"{name}: counts only with {switch} = true; leave it out"
                     raise OptionError(text, what=name, found=getattr(self, name))
-        validate.choice("armijo", self.armijo, ("printed", "sufficient"))
-        if self.tolerance is not None:
-            validate.number("tolerance", self.tolerance, least=0.0)
-        validate.integer("iterations", self.iterations)
-        validate.number("inflation", self.inflation, above=1.0)
 
 
 class Move(NamedTuple):
@@ -130,7 +119,7 @@ def nesterov(
         return status
 
     add_row(move)
-    status = until_stopped(run)
+    status = until_stopped(run, Status.STOPPED)
     end, status = surface.moved(move.point.X), evaluate.ending(move.point) or status
     del rows[move.iteration + 1 :]  # Ctrl-C may come between a row and its move
     return Result(end, status, "nesterov", move.point.energy, move.iteration, evaluate.count, rows)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..base.interrupts import stop_requested
 from ..base.tolerances import AT_REST
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from ..certificate import Certificate
     from ..certificate.proof import Attempt, Proof
     from ..stability.equilibrium import SecondVariation
+
+End = TypeVar("End")
 
 
 class Status(Enum):
@@ -169,14 +171,14 @@ Callback = Callable[[Progress], None]
 passes through to the caller of ``solve``, and so does StopIteration out of ``next()``, as a RuntimeError."""
 
 
-def until_stopped(run: Callable[[], Status]) -> Status:
-    """The status that ``run`` returns; STOPPED where StopIteration or Ctrl-C ends it.
+def until_stopped(run: Callable[[], End], stopped: End) -> End:
+    """The end that ``run`` returns; ``stopped`` where StopIteration or Ctrl-C ends it.
 
-    >>> until_stopped(lambda: Status.CONVERGED).name
+    >>> until_stopped(lambda: Status.CONVERGED, Status.STOPPED).name
     'CONVERGED'
     """
     try:
         return run()
     except (StopIteration, KeyboardInterrupt) as error:
         stop_requested(error)
-        return Status.STOPPED
+        return stopped

@@ -157,9 +157,7 @@ class SolverState:
 
     def spoils_triangles(self, X: Floats) -> bool:
         """Whether the move to X turns a triangle over, makes the worst much worse or leads too far out."""
-        if not reachable(X):
-            return True
-        if turns_over(self.at.X, X, self.quality_faces):
+        if not reachable(X) or turns_over(self.at.X, X, self.quality_faces):
             return True
         return worst_quality(X, self.quality_faces) < 0.7 * min(self.quality, self.min_quality)
 

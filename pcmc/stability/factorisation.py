@@ -89,7 +89,6 @@ def factoriser(pattern: Pattern, backend: str | None = None, units: Floats | Non
     With ``units`` u (N,), U A U is factorised in place of A, U = diag(u) > 0, so that weak parts are not
     taken for zero beside strong ones. Neither the solution nor the inertia depends on them.
 
-    >>> import numpy as np
     >>> from scipy.sparse import csr_array
     >>> pattern = Pattern(np.array([0, 2, 3]), np.array([0, 1, 1]), np.empty((0, 3)))
     >>> factor = factoriser(pattern, "superlu").factor(np.array([1.0, 2.0, 1.0]))
@@ -248,21 +247,13 @@ def _place(array: Floats | Ints) -> Any:
 
 @cache
 def _mkl() -> Any:
-    """MKL, loaded as pypardiso finds it."""
-    # without this variable it searches the whole prefix, 0.2 s each time
-    if path := _mkl_path():
-        os.environ.setdefault("PYPARDISO_MKL_RT", path)
+    """MKL, loaded as pypardiso finds it: by its package's list of files."""
+    with suppress(metadata.PackageNotFoundError):
+        every = (Path(str(file.locate())) for file in metadata.files("mkl") or ())
+        path = next((p for p in every if re.fullmatch(r"(lib)?mkl_rt[.\d]*\.(so[.\d]*|dll)", p.name)), None)
+        if path is not None and path.is_file():
+            # without this variable pypardiso searches the whole prefix, 0.2 s each time
+            os.environ.setdefault("PYPARDISO_MKL_RT", str(path.resolve()))
     import pypardiso
 
     return ctypes.CDLL(pypardiso.PyPardisoSolver().libmkl._name)  # without its types of arguments
-
-
-@cache
-def _mkl_path() -> str:
-    """The path of MKL by its package's list of files; empty if there is none."""
-    with suppress(metadata.PackageNotFoundError):
-        for file in metadata.files("mkl") or ():
-            if re.fullmatch(r"(lib)?mkl_rt[.\d]*\.(so[.\d]*|dll)", file.name):
-                path = Path(str(file.locate()))
-                return str(path.resolve()) if path.is_file() else ""
-    return ""

@@ -280,8 +280,9 @@ def _lines_of(surface: Surface, member: Member) -> Iterator[PlacedMember]:
             text = f"member {member.label!r}: no edge of the boundary runs along its curve; draw it along one"
             raise OptionError(text, what="members", where=member.label)
     else:
-        parts = re.compile(re.escape(str(member.on)) + r"(-\d+)?( \(\d+\))?")
         every = [(k, surface.patches[k].name) for k in np.flatnonzero(surface.walls).tolist()]
+        number = "" if any(member.on == name for _, name in every) else r"(-\d+)?"  # of a divider's parts
+        parts = re.compile(re.escape(str(member.on)) + number + r"( \(\d+\))?")
         walls = [(name, k) for k, name in every if parts.fullmatch(name)]
         if not walls:
             known = [name for _, name in every]

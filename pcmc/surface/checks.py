@@ -246,7 +246,6 @@ def _within(what: str, rows: Ints, count: int, kind: str) -> None:
 
 
 def refuse_shape(what: str, array: Any, expected: object) -> NoReturn:
-    """Refuse an array of another shape than expected."""
     message = f"{what}: expected shape {expected}, found {array.shape}"
     raise SurfaceError(message, what=what, found=array.shape, expected=expected)
 

@@ -80,7 +80,6 @@ class EdgesOnCurves:
         return cls([one.curve for one in held], own, at)
 
     def __getitem__(self, chosen: Bools | Ints) -> EdgesOnCurves:
-        """The chosen edges."""
         return replace(self, own=self.own[chosen], at=self.at[chosen])
 
     @property

@@ -94,7 +94,7 @@ class Admissible(NamedTuple):
 
     def part(self, vectors: Floats) -> Floats:
         """The part of vectors (n,3) in these directions, in place."""
-        _project(self, vectors)
+        project(self, vectors)
         return vectors
 
     def projectors(self, vertices: Ints) -> Floats:
@@ -204,7 +204,9 @@ def apply_supports(surface: Any, vectors: Floats, X: Floats | None = None) -> Fl
 
 
 @compiled
-def _project(admissible: Admissible, vectors: Floats) -> None:
+def project(admissible: Admissible, vectors: Floats) -> float:
+    """Leave of vectors (n,3) the part in the admissible directions, in place; its squared sum."""
+    squared = 0.0
     for v in range(len(vectors)):
         freedom, axis = admissible.freedom[v], point(admissible.axis, v)
         if freedom == 2:
@@ -212,6 +214,8 @@ def _project(admissible: Admissible, vectors: Floats) -> None:
         elif freedom < 2:
             along = dot(point(vectors, v), axis) if freedom == 1 else 0.0
             vectors[v, 0], vectors[v, 1], vectors[v, 2] = scaled(along, axis)
+        squared += dot(point(vectors, v), point(vectors, v))
+    return squared
 
 
 def onto_circles(surface: Any, X: Floats) -> Floats:

@@ -52,10 +52,6 @@ class Topology:
     valence: Ints  # (e,) the number of triangles at each edge
     placed: Ints | None = None  # (m,3) the faces with images of vertices, where some are images of others
 
-    def __post_init__(self) -> None:
-        for array in (self.edges, self.edge_of_face, self.valence):
-            read_only(array)
-
     @cached_array
     def sense(self) -> Ints:
         """(m,3) int: +1 where a face runs along the edge of ``edge_of_face`` as its row does, else -1."""
@@ -199,13 +195,12 @@ class Topology:
 def topology(faces: Ints, patch_of_face: Ints, vertex_count: int, placed: Ints | None = None) -> Topology:
     """The topology of faces (m,3) whose patches are ``patch_of_face`` (m,); ``placed`` as in Topology.
 
-    >>> import numpy as np
     >>> t = topology(np.array([[0, 1, 2], [0, 2, 3]]), np.array([0, 0]), 4)
     >>> t.edges[~t.boundary_edge].tolist(), t.valence.tolist()
     ([[0, 2]], [1, 2, 1, 1, 1])
     """
     corners = np.ascontiguousarray(faces, dtype=np.int32)
-    edges, edge_of_face, valence = _number_edges(corners, vertex_count)
+    edges, edge_of_face, valence = map(read_only, _number_edges(corners, vertex_count))
     return Topology(faces, patch_of_face, vertex_count, edges, edge_of_face, valence, placed)
 
 
@@ -233,7 +228,6 @@ def joined(pairs: Ints, stop: Bools, vertex_count: int) -> Iterator[tuple[Ints, 
 
     For each curve its vertices in order, whether it is closed, and the first of its pairs.
 
-    >>> import numpy as np
     >>> curves = joined(np.array([[5, 3], [3, 9], [1, 2]]), np.zeros(10, dtype=bool), 10)
     >>> [(vertices.tolist(), closed) for vertices, closed, _ in curves]
     [([1, 2], False), ([5, 3, 9], False)]
@@ -274,7 +268,6 @@ def vertex_kind(ends: Ints, vertex_count: int) -> Ints:
 def components(edges: Ints, vertex_count: int) -> Ints:
     """(n,) int: label of each vertex's connected part, in the order of their first vertices.
 
-    >>> import numpy as np
     >>> components(np.array([[3, 1], [2, 4]]), 5).tolist()
     [0, 1, 2, 1, 2]
     """
@@ -297,7 +290,6 @@ def curve_neighbours(links: Ints, vertex_count: int) -> tuple[Ints, Ints]:
 
     ``links`` (k,2) are curve edges in both directions: from each end to the other.
 
-    >>> import numpy as np
     >>> edges = np.array([[0, 1], [1, 4], [4, 2]])
     >>> curve, beside = curve_neighbours(np.concatenate([edges, edges[:, ::-1]]), 5)
     >>> curve.tolist(), beside.tolist()

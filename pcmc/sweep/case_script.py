@@ -32,8 +32,7 @@ def resolve(case: str) -> Callable[..., Any]:
     5.0
     """
     module, _, name = case.partition(":")
-    function: Callable[..., Any] = operator.attrgetter(name)(importlib.import_module(module))
-    return function
+    return operator.attrgetter(name)(importlib.import_module(module))
 
 
 def scalar(value: object) -> bool | int | float | str | None:

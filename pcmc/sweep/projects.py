@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -12,13 +11,14 @@ from typing import Any
 from .. import project as projects
 from ..base import validate
 from ..base.errors import FileError
+from ..base.files import PathLike
 from ..project.varied import with_units
 from .grid import Sweep
 from .solving import case_row, mesh_columns
 
 
 def project_sweep(
-    path: str | os.PathLike[str],
+    path: PathLike,
     grid: Mapping[str, Sequence[Any]],
     fixed: Mapping[str, Any] | None = None,
     *,
@@ -58,7 +58,7 @@ def project_sweep(
     return sweep
 
 
-def column_labels(path: str | os.PathLike[str], names: Iterable[str]) -> dict[str, str]:
+def column_labels(path: PathLike, names: Iterable[str]) -> dict[str, str]:
     """The names of columns with the units of a project or a surface; see ``with_units``."""
     with warnings.catch_warnings(action="ignore"):  # the sweep showed them
         start = projects.start_of(projects.load(path))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Generator
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base import validate
 from ..base.errors import SweepError
+from ..base.files import PathLike
 from ..base.interrupts import interrupts_handled, stop_requested
 from .grid import Sweep
 from .store import Record, open_store
@@ -39,7 +39,7 @@ class SweepProgress:
 
 def run(
     sweep: Sweep,
-    store: str | os.PathLike[str] | None = None,
+    store: PathLike | None = None,
     *,
     executor: Executor | None = None,
     scheduler: str | None = None,

@@ -9,7 +9,6 @@ with its process: others can read, and a second sweep is refused.
 from __future__ import annotations
 
 import json
-import os
 import sqlite3
 import time
 import zlib
@@ -23,7 +22,7 @@ from warnings import warn
 import numpy as np
 
 from ..base.errors import FileError, FileWarning
-from ..base.files import check_regular, system_error
+from ..base.files import PathLike, check_regular, system_error
 from .case_script import WORDS, answer, version
 from .grid import Sweep
 
@@ -84,7 +83,7 @@ class Store:
 
 
 @contextmanager
-def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
+def open_store(path: PathLike, sweep: Sweep) -> Iterator[Store]:
     """Open the store of ``sweep`` for writing; make the file if it is missing.
 
     FileError if it is no store, of another sweep or another version of pcmc, in use, or cannot be opened.
@@ -106,7 +105,7 @@ def open_store(path: str | os.PathLike[str], sweep: Sweep) -> Iterator[Store]:
         yield Store(path, database, _records(path, database, sweep.grid, sweep.fixed))
 
 
-def read_store(path: str | os.PathLike[str]) -> list[Record]:
+def read_store(path: PathLike) -> list[Record]:
     """The records of a store, in the order of the last sweep's grid; a sweep may be running on it.
 
     FileError if the file cannot be read, or is no store.

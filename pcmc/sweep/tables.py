@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.errors import OptionError
-from ..base.files import atomic_write, suffix_of, writing
+from ..base.files import PathLike, atomic_write, suffix_of, writing
 from ..base.libraries import require
 from .case_script import WORDS
 from .store import Record
@@ -16,7 +15,7 @@ from .store import Record
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..plot.figure import Image
+    from ..plot.scene import Image
 
 TABLES = (".csv", ".parquet")
 FIRST = ("status", "verdict", "extent", "mesh_verdict", "targets_met", "accuracy_reached")
@@ -54,7 +53,7 @@ def _frame(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(ordered, columns=None if ordered else ["case"]).set_index("case")
 
 
-def write_table(path: str | os.PathLike[str], frame: pd.DataFrame) -> None:
+def write_table(path: PathLike, frame: pd.DataFrame) -> None:
     """Write a table to ``.csv`` or ``.parquet``; the file is complete or not there at all.
 
     Floats are written with the digits that give the same float back. In Parquet, which has one type per
@@ -124,7 +123,7 @@ def short_table(table: pd.DataFrame, parameters: Sequence[str], show: Sequence[s
 def draw_sweep(
     table: pd.DataFrame,
     parameters: Sequence[str],
-    path: str | os.PathLike[str] | None = None,
+    path: PathLike | None = None,
     labels: Mapping[str, str] | None = None,
     show: str = "",
 ) -> Image:

@@ -231,6 +231,16 @@ def test_a_line_where_two_sheets_end_has_bars():
     assert check.row("reaction", "foil | foil below").value == pytest.approx(0.0, abs=1e-9)
 
 
+def test_the_one_line_that_carries_half_a_roof_has_its_whole_reaction():
+    """The mirror plane is a support, too, but carries nothing upwards: the line's reaction is the loads'."""
+    ell = [[0, 0], [6, 0], [6, 4], [3, 4], [3, 8], [0, 8]]
+    half = Plan(ell, mirrors=[[[0, 0], [6, 0]]], edge_length=1.5, tension=4.0).surface()
+    check = check_mesh(solve(half))
+    row = check.row("reaction", "patch 1")
+    assert (row.limit, row.limit_error) == (check.row("reaction").limit, check.row("reaction").limit_error)
+    assert row.limit == pytest.approx(-36.0)
+
+
 def test_other_numbers_of_meshes():
     result = solve(spherical_cap(0.25))
     exact = spherical_cap_exact()

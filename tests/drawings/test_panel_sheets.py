@@ -13,7 +13,7 @@ from shapely.geometry import Polygon
 import pcmc
 from pcmc.drawings import drawing_set
 from pcmc.drawings.panel_sheets import panel_sheets, triangles_at_true_size
-from pcmc.drawings.sheet import corner, drawing_area
+from pcmc.drawings.sheet import CORNER, drawing_area
 from pcmc.panelling.schedule import packed
 from pcmc.surface.geometry import cross_2d, edge_vectors
 
@@ -24,7 +24,7 @@ def test_panels_on_sheets_are_congruent_apart_and_within_the_frame(squares, name
     sheets = panel_sheets(triangles_at_true_size(schedule, millimetres), name)
     assert len(sheets) > 1
     number = 0
-    low, high = corner(), corner() + drawing_area(name)
+    low, high = CORNER, CORNER + drawing_area(name)
     for sheet in sheets:
         outlines = [line.points for line in sheet.lines if line.layer == "PCMC-CUT"]
         for outline in outlines:

@@ -22,12 +22,13 @@ from generators import (
 )
 from pcmc import BoundaryMotion, Direction, Patch, Room, Surface, find_equilibria, follow, plot, solve
 from pcmc.base.errors import OptionError, SurfaceError
-from pcmc.equilibria import search, shape_distance
+from pcmc.equilibria import from_known, search, shape_distance
 from pcmc.equilibria.found import Equilibria, WayDown
 from pcmc.explore.page_data import equilibria_data
 from pcmc.forces.functional import patch_areas
 from pcmc.plot import uses
 from pcmc.solvers.continuation import Branch
+from pcmc.solvers.result import Status
 
 SMALL, LARGE = spherical_cap_exact(), spherical_cap_exact(upper=True)
 
@@ -306,6 +307,22 @@ def test_a_search_that_is_stopped_before_the_first_equilibrium_has_none():
     assert "stopped before its end" in str(found)
     assert not equilibria_data(found)["equilibria"]
     assert plot.equilibria(found, width=300).shape[1] == 300
+
+
+@pytest.mark.parametrize(("module", "name", "count"), [(search, "solve", 0), (from_known, "solve_once", 1)])
+def test_ctrl_c_in_a_solve_ends_the_search(monkeypatch, module, name, count):
+    """Before, that solve alone ended, as one that does not come to rest."""
+    whole, stopped = getattr(module, name), []
+
+    def interrupted(start, **options):
+        stopped.append(1)
+        return replace(whole(start, **options), status=Status.STOPPED)
+
+    monkeypatch.setattr(module, name, interrupted)
+    found = find_equilibria(spherical_cap(0.35), ())
+    assert found.stopped
+    assert len(stopped) == 1
+    assert len(found) == count
 
 
 def test_a_search_ends_at_the_most_equilibria_that_are_wanted():

@@ -207,6 +207,16 @@ def test_each_patch_is_a_mesh_with_its_properties(tmp_path):
     assert "Pcmc_Certificate" not in get_psets(roof)
 
 
+def test_a_heavy_patch_has_no_single_curvature(tmp_path):
+    """H̄ follows slope and height, so p / 2α is that of no point; the certificate has the mean."""
+    hall = Plan([[0, 0], [4, 0], [4, 3], [0, 3]], tension=2.0, weight=0.2, edge_length=1.0).surface()
+    pcmc.write(tmp_path / "roof.ifc", hall)
+    _model, _roof, parts = roof_of(tmp_path / "roof.ifc")
+    assert "TargetMeanCurvature" not in get_pset(parts["patch 1"], "Pcmc_Patch")
+    flat = pcmc.Surface([[0, 0, 0], [4, 0, 0], [0, 3, 0]], [[0, 1, 2]], [0], hall.patches, fixed=range(3))
+    assert np.isnan(pcmc.certify(flat).patches.target[0])  # no vertex inside has one
+
+
 def test_a_result_brings_its_certificate(tmp_path):
     from generators import spherical_cap
 

@@ -12,7 +12,7 @@ from generators import spherical_cap, two_caps, two_squares
 from pcmc import plot
 from pcmc.explore.page_data import fields as page_fields
 from pcmc.explore.session import SessionState
-from pcmc.plot import figure as colors
+from pcmc.plot import colours as colors
 from pcmc.plot import pictures
 from pcmc.plot import scene as raster
 from pcmc.plot.scene import FIXED_DOT, SLIDING_DOT, view_of
@@ -243,7 +243,7 @@ def test_the_name_of_a_scale_is_not_cut_at_the_foot_of_a_picture():
 
 
 def test_signed_values_get_a_symmetric_scale():
-    from pcmc.plot.figure import color_scale
+    from pcmc.plot.colours import color_scale
 
     scale = color_scale([np.array([-1.0, np.nan, 3.0]), None], None, None)
     assert (scale.low, scale.high, scale.cmap.name) == (-3.0, 3.0, "RdBu_r")

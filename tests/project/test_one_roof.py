@@ -139,7 +139,10 @@ def test_targets_of_a_half_say_that_they_are_the_half_s(folder):
     said = "targets of areas, volumes and lengths are those of the part between the mirror planes"
     for whole in (True, False, True):  # also of a roof that was kept when the project asked for the other
         Path("half.toml").write_text(text + f"[output]\nwhole = {str(whole).lower()}\n", encoding="utf-8")
-        assert (said in project.designed("half.toml").remarks) == whole
+        outcome = project.designed("half.toml")
+        assert (said in outcome.remarks) == whole
+        [label] = outcome.report(outcome.output, files={}).targets.index
+        assert label == "area" + " (of the part)" * whole
 
 
 def test_a_value_given_for_what_the_targets_decide_is_named(folder):

@@ -86,6 +86,7 @@ FLOW = FLAT + "[solve]\nmethod = 'nesterov'\n"
         (f"{HALF}member = 'arch'\n{ARCH}kind = 'cable'\nends = 'clamped'\n", "ends"),
         (FLAT + CLOTH + "warp = [0, 1, 0]\n", "warp"),
         (FLAT + CLOTH + "patches = {roof = {warp = [0, 1, 0]}}\n", "warp"),
+        (FLAT + CLOTH + "gas = true\n", "Gas.ambient"),
         (with_output("net_pattern = 'quads'"), "net_pattern"),
         (with_output("net_pattern = 'quads'\nnet_direction = 30.0"), "net_pattern"),
         (FLOW + "momentum = false\ngamma = 0.5\n", "gamma"),

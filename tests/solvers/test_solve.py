@@ -64,10 +64,10 @@ def test_every_status_says_what_happened_and_what_to_do():
 
 def test_a_request_to_stop_becomes_a_status_in_one_place():
     for error in (StopIteration, KeyboardInterrupt):
-        assert until_stopped(mock.Mock(side_effect=error)) is Status.STOPPED
-    assert until_stopped(lambda: Status.STALLED) is Status.STALLED
+        assert until_stopped(mock.Mock(side_effect=error), Status.STOPPED) is Status.STOPPED
+    assert until_stopped(lambda: Status.STALLED, Status.STOPPED) is Status.STALLED
     with pytest.raises(ZeroDivisionError):
-        until_stopped(mock.Mock(side_effect=ZeroDivisionError))
+        until_stopped(mock.Mock(side_effect=ZeroDivisionError), Status.STOPPED)
 
 
 @pytest.mark.parametrize("method", METHODS)

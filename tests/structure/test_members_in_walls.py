@@ -14,13 +14,14 @@ import pcmc
 from generators import joined_caps
 from pcmc import Material, Snow, StructuralModel, Wind, cli
 from pcmc.base.errors import OptionError
-from pcmc.plan import CableLine, Plan
+from pcmc.plan import CableLine, Divider, Plan
 from pcmc.structure import Member, Profile, analyse
 from pcmc.structure.frames import balancing_force, turns
 from pcmc.structure.member_forces import (
     forces_on_members,
     members_at_rest,
 )
+from pcmc.structure.members import lines_on
 
 
 def test_the_junction_of_two_spheres_needs_no_bending():
@@ -166,3 +167,10 @@ def test_a_cable_in_the_place_of_a_wall_finds_a_shape_that_does_not_bend():
     [cable] = model.standing.cables
     left = forces_on_members(model, model.steps[0])[np.unique(cable.edges)[2:-2]]
     assert np.abs(left).max() < 0.05 * 6.56
+
+
+def test_a_member_leaves_the_wall_of_another_divider_alone():
+    """A wall "axis-2" is a part of a divider "axis" only where no wall has that name itself."""
+    dividers = [Divider([[x, 0], [x, 6]], name=name) for x, name in ((4, "axis"), (8, "axis-2"))]
+    bays = Plan([[0, 0], [12, 0], [12, 6], [0, 6]], dividers, edge_length=1.5, tension=4.0).surface()
+    assert [line.wall for line in lines_on(bays, [Member("axis", TUBE, STEEL)])] == ["axis"]

@@ -248,6 +248,7 @@ BAD = [
     ("plan.holes.1.curve.circle.radius", 2.0, "did you mean 'plan.holes.yard.curve"),
     ("plan.outline.5.1", 2.0, "unknown number"),
     ("plan.edge", 2.0, "unknown number"),
+    ("structure.snow", 0.5, r"no shape depends on \[structure\]"),
     ("plan.edge_length", -1, "edge_length: expected a finite number > 0, found -1"),
     ("plan.edge_length", "x", "must be a finite number, found 'x'"),
     ("plan.edge_length", True, "must be a finite number, found True"),

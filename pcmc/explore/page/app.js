@@ -168,7 +168,6 @@ class Page {
     clearTimeout(this.slow);
     this.slow = null;
     work.hidden = true;
-    card.classList.remove("working");
     card.removeAttribute("aria-busy");
     if (!this.pending) return;
     const tell = async () => {
@@ -181,7 +180,6 @@ class Page {
       this.slow = setTimeout(tell, 1000);
     };
     this.slow = setTimeout(() => {
-      card.classList.add("working");
       card.setAttribute("aria-busy", "true");
       this.slow = setTimeout(tell, 550);
     }, 250);

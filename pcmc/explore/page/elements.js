@@ -31,9 +31,6 @@ export function digits(x, count = 4) {
 export const coordinate = (x, size, count = 4) =>
   String(Number(x.toFixed(Math.max(0, count - Math.floor(Math.log10(size))))));
 
-export const input = (type, name, attributes = {}) =>
-  element("input", { type, "aria-label": name }, attributes);
-
 /** A field of one number, with a decimal point or comma: the browser's own makes 32 of "3,2" in English. */
 export function numberField(name, attributes = {}) {
   const field = element("input.number", { type: "text", inputMode: "decimal", "aria-label": name }, attributes);

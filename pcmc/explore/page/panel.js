@@ -1,6 +1,6 @@
 // A card for each patch, cable and room, with a slider and a number for each of its values.
 
-import { coordinate, digits, element, input, numberField } from "./elements.js";
+import { coordinate, digits, element, numberField } from "./elements.js";
 
 const STEPS = 1000;
 const ROOM = 2; // times a value beyond the slider's end: where it ends then
@@ -100,8 +100,8 @@ export class Panel {
     const shown = element("span.shown", { hidden: true });
     const range = new Range(value, group.wall || kind === "cables", this.usual);
     const entry = { group, index, kind, shown, target, value, range };
-    entry.slider = input("range", name, {
-      id, min: 0, max: STEPS, step: 1,
+    entry.slider = element("input", {
+      type: "range", "aria-label": name, id, min: 0, max: STEPS, step: 1,
       oninput: () => this.change(entry, range.value(entry.slider.value), false),
       onchange: () => this.changed(true),
     });

@@ -16,7 +16,7 @@ from ...base.arrays import Floats
 from ...base.errors import MissingExtra, OptionError
 from ...surface import Surface, expect_surface
 from ...surface.lagrange import expect_flat
-from ..result import Callback
+from ..result import Callback, until_stopped
 from .branch_point import ALONG, leaving
 from .options import Ending, FollowOptions
 from .parameters import BoundaryMotion, Direction, ParameterLine
@@ -215,20 +215,11 @@ class Branch:
 
 def _traced(parameter: Direction | BoundaryMotion, tracer: Tracer) -> Branch:
     """The branch that a tracer follows to its end."""
-    ending, detail = tracer.run()
+    end = until_stopped(tracer.run, (Ending.STOPPED, ""))
     columns = list(tracer.event("", tracer.here.state, 0.0, 0, 0))
-    events = pd.DataFrame(tracer.events, columns=columns)
-    return Branch(
-        parameter,
-        pd.DataFrame(tracer.rows),
-        events.drop(columns="surface"),
-        tracer.surfaces,
-        ending,
-        detail,
-        dict(enumerate(events.surface)),
-        tracer.line,
-        tracer.options,
-    )
+    points, events = pd.DataFrame(tracer.rows), pd.DataFrame(tracer.events, columns=columns)
+    at_events = dict(enumerate(events.pop("surface")))
+    return Branch(parameter, points, events, tracer.surfaces, *end, at_events, tracer.line, tracer.options)
 
 
 def follow(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from ...base import validate
+from ...base.validate import check_options, choice, integer, number, option, positive, refuse
 
 CONTROLS = ("arclength", "parameter", "volume", "height")
 
@@ -56,29 +56,20 @@ class FollowOptions:
     pcmc.base.errors.OptionError: step: expected a number ≠ 0, with the sign of...
     """
 
-    control: str = "arclength"
-    step: float = 0.05
-    smallest: float = 1e-5
+    control: str = option("arclength", choice, known=CONTROLS)
+    step: float = option(0.05, number)
+    smallest: float = option(1e-5, positive)
     largest: float = 0.15
-    steps: int = 200
-    tolerance: float = 1e-10
-    folds: int | None = None
-    min_quality: float = 0.45
-    remesh: float | None = None
-    keep: int = 1
+    steps: int = option(200, integer)
+    tolerance: float = option(1e-10, positive)
+    folds: int | None = option(None, integer, least=1)
+    min_quality: float = option(0.45, number, least=0.0, below=1.0)
+    remesh: float | None = option(None, positive)
+    keep: int = option(1, integer, least=1)
     backend: str | None = None
 
     def __post_init__(self) -> None:
-        validate.choice("control", self.control, CONTROLS)
-        if validate.number("step", self.step) == 0.0:
-            validate.refuse("step", self.step, "a number ≠ 0, with the sign of the first change of λ")
-        validate.positive("smallest", self.smallest)
-        validate.number("largest", self.largest, least=self.smallest)
-        validate.integer("steps", self.steps)
-        validate.positive("tolerance", self.tolerance)
-        if self.folds is not None:
-            validate.integer("folds", self.folds, least=1)
-        validate.number("min_quality", self.min_quality, least=0.0, below=1.0)
-        if self.remesh is not None:
-            validate.positive("remesh", self.remesh)
-        validate.integer("keep", self.keep, least=1)
+        check_options(self)
+        if self.step == 0.0:
+            refuse("step", self.step, "a number ≠ 0, with the sign of the first change of λ")
+        number("largest", self.largest, least=self.smallest)

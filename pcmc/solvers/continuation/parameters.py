@@ -183,7 +183,6 @@ class ParameterLine:
         return all((varied[kind] > 0.0).all() for kind in ("tensions", "cables") if kind in varied)
 
     def surface_at(self, surface: Surface, value: float) -> Surface:
-        """The surface with its values at λ."""
         named = self.named(surface, value)
         under = (name for kind in ("pressures", "snows") for name in named.get(kind, ()))
         walls = [name for name in under if surface.walls[surface.patch_index(name)]]

@@ -40,13 +40,11 @@ class Segment:
         return self.start.state.mesh is self.end.state.mesh
 
     def point(self, t: float) -> BranchPoint:
-        """The branch point at t."""
         if t == self.length:
             return self.end
         return branch_point(self.solve(t), self.start.tangent)
 
     def value(self, name: str, t: float) -> float:
-        """A quantity at t."""
         ends = {0.0: self.start.state, self.length: self.end.state}
         return float(getattr(ends[t] if t in ends else self.solve(t), name))
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import Any
 
 from ...base.errors import NoBranch, SurfaceError
-from ...base.interrupts import stop_requested
 from ...base.tolerances import EVENT_ACCURACY, START_RESIDUAL
 from ...forces.rooms import room_pressures
 from ...meshing.quality import redistribute, turns_over
@@ -100,13 +99,6 @@ class Tracer:
 
     def run(self) -> tuple[Ending, str]:
         """Follow the branch to its end; why it ends, and the last difficulty."""
-        try:
-            return self._advance()
-        except (StopIteration, KeyboardInterrupt) as error:
-            stop_requested(error)
-            return Ending.STOPPED, ""
-
-    def _advance(self) -> tuple[Ending, str]:
         self.record()
         if any(getattr(self.here.state, name) == goal for name, goal in self.goals.items()):
             return Ending.REACHED, ""
@@ -202,10 +194,8 @@ class Tracer:
         """The state with a new contact with Π, solved at a fixed parameter, on a mesh of its own."""
         part = near.rest.part
         whole = part.whole_at(part.landed(near.X, near.mesh.reaches_plane(near.X)))
-        own = self.options
-        result = solve_once(
-            whole, "newton", target="stationary", tolerance=own.tolerance, backend=own.backend
-        )
+        given = {"tolerance": self.options.tolerance, "backend": self.options.backend}
+        result = solve_once(whole, target="stationary", **given)
         if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
             raise KeyboardInterrupt
         if not result.converged:
@@ -263,7 +253,6 @@ class Tracer:
             self.here = after
 
     def events_on(self, segment: Segment) -> list[dict[str, Any]]:
-        """The events on a segment, in their order."""
         start, end, length = segment.start, segment.end, segment.length
         if not segment.same_mesh or length <= 2.0 * EVENT_ACCURACY:
             events = self.events_between(start, end, length)

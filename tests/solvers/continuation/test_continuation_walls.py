@@ -102,8 +102,8 @@ def test_ctrl_c_while_a_contact_is_solved_for_ends_the_branch(monkeypatch):
     def pressed(progress):
         raise KeyboardInterrupt
 
-    def interrupted(surface, method, **options):
-        return solve(surface, method, pressed, **options)
+    def interrupted(surface, **options):
+        return solve(surface, "newton", pressed, **options)
 
     monkeypatch.setattr("pcmc.solvers.continuation.tracing.solve_once", interrupted)
     branch = follow(start, "wall", 2.51)
