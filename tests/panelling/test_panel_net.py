@@ -230,6 +230,16 @@ def test_a_grid_in_plan_is_one_on_a_tilted_plane(rectangle, pattern):
     assert nets[0].points @ own.T == pytest.approx(nets[1].points, abs=1e-6)
 
 
+def test_a_grid_in_plan_lies_on_both_sheets_of_a_cushion():
+    """The lower sheet's outside is below: seen from there the grid is its mirror image."""
+    cushion = Plan([[0, 0], [8, 0], [8, 6], [0, 6]], cushion=1.0, edge_length=1.0, tension=12.0).surface()
+    found = panel_net(pcmc.solve(cushion).surface, 2.1, "quads")
+    above, below = (found.panels["patch"] == f"patch 1{name}" for name in ("", " below"))
+    np.testing.assert_allclose(*(sorted(found.panels["area"][side]) for side in (above, below)), rtol=1e-9)
+    inner = found.nodes["kind"] == "inside"
+    assert (found.normals[inner, 2] * found.points[inner, 2] > 0.0).all()
+
+
 def test_hexagons_have_three_edges_at_each_node_inside_and_are_planar(rectangle):
     net = panel_net(rectangle, 1.0, "hexagons")
     ends = net.beams[["node", "other"]].to_numpy().ravel() - 1
