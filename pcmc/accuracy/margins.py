@@ -38,7 +38,8 @@ from ..forces.functional import by_rates
 from ..forces.pinching import standing_part
 from ..forces.triangles import heavy_triangle_pulls
 from ..solvers import solve_once
-from ..solvers.continuation import Branch, Ending, follow
+from ..solvers.continuation import Branch, Ending
+from ..solvers.continuation.branch import follow_until
 from ..solvers.continuation.branch_point import ALONG
 from ..solvers.result import Callback, Progress, Result
 from ..surface import Surface
@@ -136,22 +137,15 @@ def _follow(
     surface: Surface, varied: Varied, index: int, most: float, callback: Callback | None, largest: float
 ) -> Branch:
     """The branch as far as it is stable, and a point further."""
-    sense, over = (1.0 if varied.more else -1.0), [False]
+    sense = 1.0 if varied.more else -1.0
 
-    def watch(progress: Progress) -> None:
-        if callback is not None:
-            callback(progress)
+    def over(progress: Progress) -> bool:
         row = progress.row
         left = row["index"] > index or sense * row["slope"] < 0.0
-        over[0] = left or any((pulls(progress.surface()) <= 0.0).any() for pulls in HEAVY)
-        if over[0]:
-            raise StopIteration
+        return left or any((pulls(progress.surface()) <= 0.0).any() for pulls in HEAVY)
 
     goal, first = most if varied.more else 1.0 / most, min(FIRST, largest)
-    branch = follow(surface, varied.direction, goal, callback=watch, step=first, largest=largest)
-    if branch.ending is Ending.STOPPED and not over[0]:
-        raise KeyboardInterrupt
-    return branch
+    return follow_until(over, callback, surface, varied.direction, goal, step=first, largest=largest)
 
 
 def _compression(branch: Branch) -> float | None:

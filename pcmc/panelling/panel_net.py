@@ -21,7 +21,7 @@ from ..io.obj import SPECIAL
 from ..io.text import escaped
 from ..surface import Patch, Surface, expect_surface
 from ..surface.distance import distances
-from ..surface.geometry import cross_2d, face_areas, segment_lengths
+from ..surface.geometry import area_vectors, cross_2d, face_areas, segment_lengths
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import point_text
 from .net import INSIDE, Net, SheetNet, net, tidied, without_flat
@@ -245,6 +245,8 @@ def _sheet_net(
     middle = 0.5 * (every.max(axis=0) + every.min(axis=0))
     steps = np.array([0.5 * np.sqrt(3.0), 1.5]) if pattern == "hexagons" else np.ones(2)
     grid = (plan - middle) @ np.array([[c, -s], [s, c]]) / (size * steps)
+    if area_vectors(sheet.X[sheet.F]).sum(axis=0) @ surface.plane.normal < 0.0:
+        grid[:, 0] *= -1.0  # seen from outside: from below, as of a cushion's lower sheet
     at = np.stack([nudged(grid[:, k], sheet.F) for k in range(2)], axis=2)
     over = cross_2d(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]) <= 0.0
     if over.any():

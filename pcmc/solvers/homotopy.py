@@ -18,7 +18,8 @@ from ..certificate.proof import Attempt
 from ..forces.functional import gradient
 from ..surface import Surface
 from . import solve_once
-from .continuation import BoundaryMotion, Branch, Direction, Ending, follow
+from .continuation import BoundaryMotion, Branch, Direction, Ending
+from .continuation.branch import follow_until
 from .result import Callback, Progress, Result, Status
 from .starts import low_start
 
@@ -103,34 +104,28 @@ class Solves:
     ) -> Branch | None:
         """A branch until it arrives or turns, in no more steps than a solve may take; None if none starts.
 
-        StopIteration if it was stopped.
+        KeyboardInterrupt if it was stopped.
         """
-        interrupted: list[BaseException] = []
 
         def count(progress: Progress) -> None:
             square = float((gradient(progress.surface()) ** 2).sum())
             row = {**progress.row, "iteration": self.steps, "step": "branch", "gradient_squared": square}
             self.steps += 1
-            try:
-                self._show(progress.surface, row)
-            except BaseException as error:
-                interrupted.append(error)
-                raise
+            self._show(progress.surface, row)
 
         try:
-            branch = follow(
+            branch = follow_until(
+                has_turned(homotopy.back),
+                count,
                 surface,
                 parameter,
                 1.0 / homotopy.unit,
-                callback=until_turned(count, homotopy.back),
                 min_quality=MIN_QUALITY,
                 steps=min(homotopy.steps, self.options.get("iterations", homotopy.steps)),
                 smallest=homotopy.smallest,
             )
         except NoBranch:
             return None
-        if interrupted:  # by the callback, whatever it raised
-            raise interrupted[0]
         self.evaluations += int(branch.points.iterations.sum())
         return branch
 
@@ -171,25 +166,17 @@ class BranchEnd(NamedTuple):
     quality: float
 
 
-def until_turned(
-    extra: Callable[[Progress], None] | None = None, back: float | None = None
-) -> Callable[[Progress], None]:
-    """A callback for ``follow``: ends a branch that has turned back, or whose triangles are poor.
-
-    ``extra`` is called with each point; ``back`` is as in ``classify_end``.
-    """
+def has_turned(back: float | None) -> Callable[[Progress], bool]:
+    """Whether a branch has turned back at the next point, or its triangles are poor; as ``classify_end``."""
     farthest = 0.0
 
-    def watch(progress: Progress) -> None:
+    def over(progress: Progress) -> bool:
         nonlocal farthest
         farthest = max(farthest, progress.row["parameter"])
-        if extra is not None:
-            extra(progress)
         slack = BACK * farthest if back is None else back
-        if progress.row["parameter"] < farthest - slack or progress.row["quality"] < HOMOTOPY_END:
-            raise StopIteration
+        return progress.row["parameter"] < farthest - slack or progress.row["quality"] < HOMOTOPY_END
 
-    return watch
+    return over
 
 
 def classify_end(branch: Branch, back: float | None = None) -> BranchEnd:

@@ -152,17 +152,19 @@ def mesh_columns(outcome: Outcome) -> dict[str, Any]:
 
 
 def _tables(certificate: Certificate) -> dict[str, Any]:
-    """The numbers of the certificate's tables, each named by its row and column."""
+    """The numbers of the certificate's tables, each named by its row and column; the pressure of a room that
+    is named as a patch is "room left.pressure"."""
     cables = list(certificate.cables.get("cable", ()))  # numbered where supports cut one into several rows
     named = [f"{n} {cables[:k].count(n) + 1}" if cables.count(n) > 1 else n for k, n in enumerate(cables)]
     cells: dict[str, Any] = {}
-    for frame, names in (
-        (certificate.patches, certificate.patches["patch"]),
-        (certificate.rooms, certificate.rooms.get("room", ())),
-        (certificate.cables, named),
-        (certificate.junctions, [f"junction {i}" for i in certificate.junctions.index]),
-        (certificate.boundaries, [f"boundary {i}" for i in certificate.boundaries.index]),
+    for kind, frame, names in (
+        ("patch", certificate.patches, certificate.patches["patch"]),
+        ("room", certificate.rooms, certificate.rooms.get("room", ())),
+        ("cable", certificate.cables, named),
+        ("", certificate.junctions, [f"junction {i}" for i in certificate.junctions.index]),
+        ("", certificate.boundaries, [f"boundary {i}" for i in certificate.boundaries.index]),
     ):
         rows = zip(names, frame.select_dtypes("number").to_dict("records"), strict=True)
-        cells |= {f"{name}.{column}": value for name, row in rows for column, value in row.items()}
+        own = {f"{name}.{column}": value for name, row in rows for column, value in row.items()}
+        cells |= {f"{kind} {n}" if n in cells else n: value for n, value in own.items()}
     return cells

@@ -19,7 +19,8 @@ from pcmc.base.tolerances import HOMOTOPY_END, SOUND
 from pcmc.meshing.refinement import refine
 from pcmc.solvers import solve_once
 from pcmc.solvers.continuation import Branch, Direction, Ending, follow
-from pcmc.solvers.homotopy import BACK, classify_end, until_turned
+from pcmc.solvers.continuation.branch import follow_until
+from pcmc.solvers.homotopy import BACK, classify_end, has_turned
 from pcmc.solvers.result import Progress, Result
 
 PATCHES = ("wall", "large", "small")
@@ -151,10 +152,8 @@ def _towards(target: Floats, start: Floats, edge_length: float) -> Branch:
     """The branch from an equilibrium along the line to other tensions, λ from 0 to 1."""
     at_rest = equilibrium(start, edge_length).surface
     line = {name: v for name, v in zip(PATCHES, (target - start).tolist(), strict=True) if v}
-    watch = until_turned(back=BACK)
-    return follow(
-        at_rest, Direction(line, relative=True), 1.0, callback=watch, steps=STEPS, smallest=SHORTEST
-    )
+    there = Direction(line, relative=True)
+    return follow_until(has_turned(BACK), None, at_rest, there, 1.0, steps=STEPS, smallest=SHORTEST)
 
 
 def _found(branch: Branch) -> dict[str, Any]:

@@ -281,6 +281,16 @@ def test_stopped_on_the_branch_and_errors_pass_through():
         solve(surface, callback=stop(ValueError))
 
 
+def test_ctrl_c_between_the_points_of_a_branch_ends_the_search(monkeypatch):
+    def pressed(*given):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pcmc.solvers.continuation.tracing.Tracer.step", pressed)
+    result = solve(paraboloid(5.0, 0.45))
+    assert result.status is Status.STOPPED
+    assert not result.tried
+
+
 def test_refinement_goes_on_from_a_further_start():
     result = solve(paraboloid(5.0, 0.6), levels=1)
     assert result.certificate.verdict is Verdict.STABLE

@@ -2,13 +2,15 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
 import pcmc
-from generators import two_squares
+from generators import double_bubble, two_squares
 from pcmc.base.errors import OptionError
 from pcmc.sweep import Sweep, run, solve_case
+from pcmc.sweep.solving import case_row
 
 
 def test_solve_case_gives_the_solvers_and_the_surfaces_numbers():
@@ -33,6 +35,14 @@ def test_solve_case_renames_a_number_that_a_parameter_has_the_name_of():
     values = solve_case("tests.sweep.test_sweep_solving:with_volume", "nesterov", volume=2.0, iterations=0)
     assert "volume" not in values
     assert values["volume_reached"] == pcmc.certify(two_squares(4, alpha=2.0)).volume
+
+
+def test_a_room_with_the_name_of_a_wall_leaves_the_wall_its_numbers():
+    bubbles = double_bubble(0.6, volumes=(1.0, 1.0))
+    left, right = bubbles.rooms
+    values = case_row(pcmc.solve(bubbles.rebuilt(rooms=(replace(left, name="wall"), right))), ())
+    assert values["wall.pressure"] == 0.0
+    assert values["room wall.pressure"] == values["left.pressure"] > 1.0
 
 
 def test_solve_case_in_a_sweep():

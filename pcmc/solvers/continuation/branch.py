@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from ...base.arrays import Floats
 from ...base.errors import MissingExtra, OptionError
 from ...surface import Surface, expect_surface
 from ...surface.lagrange import expect_flat
-from ..result import Callback, until_stopped
+from ..result import Callback, Progress, until_stopped
 from .branch_point import ALONG, leaving
 from .options import Ending, FollowOptions
 from .parameters import BoundaryMotion, Direction, ParameterLine
@@ -308,6 +308,25 @@ def follow(
     if stop is not None and stop != line.value:
         chosen = replace(chosen, step=math.copysign(chosen.step, stop - line.value))
     return _traced(direction, Tracer(surface, line, goals, chosen, callback))
+
+
+def follow_until(
+    over: Callable[[Progress], bool], callback: Callback | None, *what: Any, **options: Any
+) -> Branch:
+    """``follow`` to the first point that is ``over``; KeyboardInterrupt where it is stopped before."""
+    ended = False
+
+    def watch(progress: Progress) -> None:
+        nonlocal ended
+        if callback is not None:
+            callback(progress)
+        if ended := over(progress):
+            raise StopIteration
+
+    branch = follow(*what, callback=watch, **options)
+    if branch.ending is Ending.STOPPED and not ended:
+        raise KeyboardInterrupt
+    return branch
 
 
 def _goals(stop: float | None, until: Mapping[str, float] | None) -> dict[str, float]:
