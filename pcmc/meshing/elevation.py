@@ -41,7 +41,7 @@ def elevate(surface: Surface, order: int, project: Projection | None = None) -> 
     """
     expect_surface(surface)
     expect_no_images(surface, "curved elements")
-    known_order(order)
+    order = known_order(order)
     if surface.order > 1:
         message = f"order: the surface is of order {surface.order} already; give order={surface.order}"
         raise SurfaceError(message, what="order", found=order, expected=surface.order)

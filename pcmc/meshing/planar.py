@@ -12,7 +12,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints, mask_of
 from ..base.errors import OptionError, SurfaceError
 from ..base.tolerances import ON
-from ..surface.geometry import angles, bounding_size, cross_2d, file_origin, segment_lengths, vertex_sums
+from ..surface.geometry import angles, cross_2d, in_edges, segment_lengths, vertex_sums
 from ..surface.topology import SIDES, components, edge_places
 from .quality import improve_angles
 
@@ -62,36 +62,37 @@ def triangulate(
     3.0
     """
     given, segments = np.asarray(points, dtype=float), np.asarray(segments, dtype=np.int64)
-    origin = file_origin(given, bounding_size(given))  # near it distances keep their digits
-    fixed, inside_holes = given - origin, np.reshape(holes, (-1, 2)) - origin
     validate.positive("edge_length", edge_length)
-    if near := cKDTree(fixed).query_pairs(1e-9 * edge_length):
+    # in edge lengths from a corner, without the last digits: the same mesh in all units and places
+    origin = given.min(axis=0, initial=np.inf)
+    fixed, inside_holes = (in_edges(a - origin, edge_length) for a in (given, np.reshape(holes, (-1, 2))))
+    if near := cKDTree(fixed).query_pairs(ON):
         i, j = min(near)
         problem = f"points {i} and {j} coincide at {given[i].tolist()}; merge them"
         raise SurfaceError(problem, what="points", where=(i, j))
     if len(segments) < 3:
         problem = f"segments: at least 3 are needed to enclose an area, found {len(segments)}"
         raise SurfaceError(problem, what="segments", found=len(segments), expected=3)
-    spacing = np.full(len(fixed), float(edge_length))  # at each point its shortest segment
+    spacing = np.ones(len(fixed))  # at each point its shortest segment
     np.minimum.at(spacing, segments.ravel(), np.repeat(segment_lengths(fixed, segments), 2))
-    everything = np.concatenate([fixed, _lattice(fixed, segments, edge_length)])
-    mesh = _inside(everything, segments, inside_holes, len(fixed), origin)
+    everything = np.concatenate([fixed, _lattice(fixed, segments)])
+    mesh = _inside(everything, segments, inside_holes, given)
     for step in range(ROUNDS):
         X, T = mesh.points, mesh.triangles
         if step % 4 == 0 and step < ROUNDS - 4:
-            wanted = _wanted(X, fixed, spacing, edge_length)
+            wanted = _wanted(X, fixed, spacing)
             X = X[_spaced_out(X, CROWDED * wanted, len(fixed))]
             if len(X) == len(mesh.points):
-                X = np.concatenate([X, _additions(mesh, segments, fixed, spacing, edge_length)])
+                X = np.concatenate([X, _additions(mesh, segments, fixed, spacing)])
         else:
             area = np.abs(signed_areas(X, T))[:, None]
             sums = vertex_sums(np.hstack([area * X[T].mean(axis=1), area]), T, len(X))[len(fixed) :]
             X = np.concatenate([fixed, sums[:, :2] / sums[:, 2:]])
-        mesh = _inside(X, segments, inside_holes, len(fixed), origin)
+        mesh = _inside(X, segments, inside_holes, given)
     movable = np.arange(len(mesh.points)) >= len(fixed)
     flat = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
     better = improve_angles(flat, mesh.triangles, movable, GOOD_ANGLE)[:, :2]
-    return replace(mesh, points=better + origin)
+    return replace(mesh, points=np.concatenate([given, origin + edge_length * better[len(given) :]]))
 
 
 def signed_areas(points: Floats, triangles: Ints) -> Floats:
@@ -118,14 +119,14 @@ def locate(mesh: PlanarMesh, points: Floats) -> Ints:
     return triangle
 
 
-def _lattice(points: Floats, segments: Ints, h: float) -> Floats:
+def _lattice(points: Floats, segments: Ints) -> Floats:
     """(p,2) lattice points clear of the segments, symmetric about the middle of the bounding box."""
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    step = np.array([h, h * np.sqrt(0.75)])
+    step = np.array([1.0, np.sqrt(0.75)])
     i, j = (np.arange(-k, k + 1) for k in np.ceil(0.5 * np.ptp(points, axis=0) / step).astype(int))
     column, row = (a.ravel() for a in np.meshgrid(i, j, indexing="ij"))
     lattice = middle + step * np.stack([column + 0.5 * (row % 2), row], axis=1)
-    return lattice[_clear(lattice, points, segments, np.full(len(points), float(h)))]
+    return lattice[_clear(lattice, points, segments, np.ones(len(points)))]
 
 
 def _clear(candidates: Floats, points: Floats, segments: Ints, clearance: Floats) -> Bools:
@@ -136,7 +137,7 @@ def _clear(candidates: Floats, points: Floats, segments: Ints, clearance: Floats
     return np.asarray(distance >= CLEARANCE * reach[nearest])
 
 
-def _inside(points: Floats, segments: Ints, holes: Floats, k: int, origin: Floats) -> PlanarMesh:
+def _inside(points: Floats, segments: Ints, holes: Floats, given: Floats) -> PlanarMesh:
     """The Delaunay triangulation with every segment an edge, inside the outline and outside the holes; points
     used elsewhere only go. Segments separate the parts of it; a part with a side that no other triangle has
     is outside."""
@@ -148,10 +149,10 @@ def _inside(points: Floats, segments: Ints, holes: Floats, k: int, origin: Float
     T[area < 0] = T[area < 0][:, ::-1]
     missing = segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0].tolist()
     for a, b in missing:
-        T = _with_segment(points, T, a, b, origin)
+        T = _with_segment(points, T, a, b, given)
     if missing:  # one put in may have taken another away
         for a, b in segments[edge_places(segments, T[:, SIDES].reshape(-1, 2)) < 0].tolist():
-            raise _crossing(points + origin, a, b)
+            raise _crossing(given, a, b)
     sides = T[:, SIDES].reshape(-1, 2)
     free = edge_places(sides, segments) < 0
     pairs = twins(sides.min(axis=1) * len(points) + sides.max(axis=1))
@@ -161,13 +162,13 @@ def _inside(points: Floats, segments: Ints, holes: Floats, k: int, origin: Float
     located = locate(PlanarMesh(points, T, part), holes)
     for place, triangle in enumerate(located):
         if triangle == OUTSIDE or part[triangle] in outer:
-            problem = f"the point {(holes[place] + origin).tolist()} of hole {place} lies outside the outline"
+            problem = f"the point of hole {place} lies outside the outline"
             raise OptionError(problem, what="holes", where=place)
     kept = ~np.isin(part, [*outer, *part[located]])
     if not kept.any():
         raise SurfaceError("the segments enclose no area; close the outline", what="segments")
     used = mask_of(T[kept], len(points))
-    used[:k] = True
+    used[: len(given)] = True
     region = np.unique(part[kept], return_inverse=True)[1]
     return PlanarMesh(points[used], (np.cumsum(used) - 1)[T[kept]], region)
 
@@ -180,12 +181,12 @@ def twins(key: Ints) -> Ints:
     return order[np.stack([first, first + 1], axis=1)]
 
 
-def _crossing(X: Floats, a: int, b: int) -> SurfaceError:
-    problem = f"segment {X[a].tolist()} - {X[b].tolist()} crosses another segment or passes through a point;"
-    return SurfaceError(f"{problem} split it there", what="segments", where=(a, b))
+def _crossing(given: Floats, a: int, b: int) -> SurfaceError:
+    problem = f"segment {given[a].tolist()} - {given[b].tolist()} crosses another segment or passes through"
+    return SurfaceError(f"{problem} a point; split it there", what="segments", where=(a, b))
 
 
-def _with_segment(X: Floats, T: Ints, a: int, b: int, origin: Floats) -> Ints:
+def _with_segment(X: Floats, T: Ints, a: int, b: int, given: Floats) -> Ints:
     """The triangulation with edge (a, b); the triangles that it crosses are replaced (Anglada, 1997)."""
     E, along = T[:, SIDES], X[b] - X[a]
     u, v = X[E[..., 0]], X[E[..., 1]]
@@ -201,7 +202,7 @@ def _with_segment(X: Floats, T: Ints, a: int, b: int, origin: Floats) -> Ints:
             rim.append(at)
             at = follow.get(at)
         if at != end or not rim:
-            raise _crossing(X + origin, a, b)
+            raise _crossing(given, a, b)
         new += _delaunay_below(X, end, start, rim[::-1])
     return np.concatenate([T[~crossed], np.array(new, dtype=np.int64)])
 
@@ -218,13 +219,13 @@ def _delaunay_below(X: Floats, a: int, b: int, rim: list[int]) -> list[tuple[int
     return [(a, b, c), *left, *right]
 
 
-def _wanted(points: Floats, fixed: Floats, spacing: Floats, h: float) -> Floats:
+def _wanted(points: Floats, fixed: Floats, spacing: Floats) -> Floats:
     """(p,) edge length wanted at each point: that of the nearest given point, growing with distance."""
     distance, nearest = cKDTree(fixed).query(points)
-    return np.minimum(h, spacing[nearest] + 0.3 * distance)
+    return np.minimum(1.0, spacing[nearest] + 0.3 * distance)
 
 
-def _additions(mesh: PlanarMesh, segments: Ints, fixed: Floats, spacing: Floats, h: float) -> Floats:
+def _additions(mesh: PlanarMesh, segments: Ints, fixed: Floats, spacing: Floats) -> Floats:
     """(p,2) circumcentres of triangles that are too large or too sharp, apart from each other."""
     X, T = mesh.points, mesh.triangles
     a = X[T[:, 0]]
@@ -234,7 +235,7 @@ def _additions(mesh: PlanarMesh, segments: Ints, fixed: Floats, spacing: Floats,
     flat = np.abs(twice) <= 1e-12 * (uu + vv)
     centre = a + offset / np.where(flat, 1.0, twice)[:, None]
     radius = np.linalg.norm(centre - a, axis=1)
-    wanted = _wanted(X[T].mean(axis=1), fixed, spacing, h)
+    wanted = _wanted(X[T].mean(axis=1), fixed, spacing)
     sharp = angles(X[T]).min(axis=1) < GOOD_ANGLE
     chosen = np.flatnonzero(~flat & ((radius > wanted) | (sharp & (radius > 0.8 * wanted))))
     order = chosen[np.argsort(-radius[chosen] / wanted[chosen], kind="stable")]

@@ -13,7 +13,7 @@ from ..base.errors import OptionError, SurfaceError, unknown
 from ..base.tolerances import ON
 from ..surface import HeldCurve, Patch, Plane, Surface
 from ..surface.curves import polyline
-from ..surface.geometry import bounding_size, lengths_along
+from ..surface.geometry import bounding_size, in_edges, lengths_along
 from ..surface.pieces import to_space
 from ..surface.topology import EdgeCurve
 from .planar import triangulate
@@ -188,8 +188,9 @@ class _Builder:
         """Vertices of the vertical line under a vertex, from the foot up to the vertex itself."""
         if vertex not in self.lines:
             (x, y, top), bottom = self.local[vertex], self.floor[vertex]
-            rows = 0 if top - bottom <= self.tolerance else max(1, round((top - bottom) / self.edge_length))
-            new = [np.array([x, y, bottom + (top - bottom) * k / rows]) for k in range(rows)]
+            height = top - bottom
+            rows = 0 if height <= self.tolerance else max(1, int(np.rint(in_edges(height, self.edge_length))))
+            new = [np.array([x, y, bottom + height * k / rows]) for k in range(rows)]
             self.lines[vertex] = [*self.add_points(new), vertex]
             if self.fixed[vertex]:
                 self.held.update(self.lines[vertex][:-1])

@@ -85,6 +85,8 @@ def mask(chosen: Any, n: int, what: str) -> Bools:
         return given.copy()
     indices = _integers(given, what).ravel() if given.size else np.zeros(0, dtype=np.int64)
     _within(what, indices, n, "vertex")
+    if len(indices) == n > 2 and indices.max() <= 1:
+        raise SurfaceError(f"{what}: {n} numbers that are 0 or 1; give a mask as booleans", what=what)
     return mask_of(indices, n)
 
 

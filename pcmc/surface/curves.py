@@ -15,7 +15,7 @@ from ..base import validate
 from ..base.arrays import Bools, Floats, Ints
 from ..base.errors import OptionError
 from ..base.tolerances import ON
-from .geometry import lengths_along
+from .geometry import in_edges, lengths_along
 from .guides import Plane
 from .pieces import Alike, Piece
 
@@ -148,12 +148,14 @@ class Curve:
         stops, extremes = [low], np.concatenate([self.extremes, self.extremes + float(len(self.pieces))])
         inside = slice(*np.searchsorted(extremes, [start, end]))
         for length in self._lengths_at(extremes[inside]).tolist():
-            if min(length - stops[-1], high - length) >= NEAR * edge_length:
+            if in_edges(min(length - stops[-1], high - length), edge_length) >= NEAR:
                 stops.append(length)
         inner = []
         for first, second in pairwise([*stops, high]):
             bend = self._turning(first, second)
-            count = max(1, round((second - first) / edge_length), math.ceil(bend / EDGE_TURN - 1e-9))
+            count = max(
+                1, int(np.rint(in_edges(second - first, edge_length))), math.ceil(bend / EDGE_TURN - 1e-9)
+            )
             inner.append(first + (second - first) * np.arange(count) / count)
         return self._parameter_around(np.concatenate(inner)[1:])
 

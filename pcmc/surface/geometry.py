@@ -13,6 +13,7 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
+import numpy.typing as npt
 
 from ..base.arrays import Floats, Ints, Vector
 from ..base.compiled import compiled, inlined
@@ -145,6 +146,15 @@ def file_origin(X: Floats, size: float) -> Floats:
     """
     middle = X.mean(axis=0)
     return np.round(middle) if np.linalg.norm(middle) > FAR * size else np.zeros_like(middle)
+
+
+def in_edges(lengths: npt.ArrayLike, edge_length: float) -> Floats:
+    """Lengths (…) in edge lengths, to 30 binary digits: what is rounded in other units decides nothing.
+
+    >>> in_edges([0.7, 2.1], 0.2).tolist(), in_edges([700.0, 2100.0], 200.0).tolist()
+    ([3.5, 10.5], [3.5, 10.5])
+    """
+    return np.ldexp(np.rint(np.ldexp(np.asarray(lengths) / edge_length, 30)), -30)
 
 
 def lengths_along(points: Floats) -> Floats:

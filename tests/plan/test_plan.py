@@ -391,3 +391,26 @@ def test_a_line_ends_on_an_upright_one_by_the_digits_that_were_typed():
     assert mask[end & ~surface.fixed].all()
     assert np.abs(plane.height(surface.vertices[end])).max() < 1e-12
     assert solve(surface).converged
+
+
+UNEVEN = {  # rounding chose between triangles of equal worth, or between two numbers of edges
+    "wall": ([[0, 0], [6.7, 0], [6.7, 13.09], [0, 13.09]], [[[0, 6.545], [6.7, 4.36]]], 0.97),
+    "half edges": ([[0, 0], [12.88, 0], [12.88, 4.64], [6.44, 4.64], [6.44, 9.28], [0, 9.28]], [], 0.56),
+}
+
+
+@pytest.mark.parametrize("name", UNEVEN)
+@pytest.mark.parametrize(("unit", "shift"), [(1000.0, 0.0), (0.3048, 0.0), (1.0, 512.0)])
+def test_a_plan_has_one_mesh_in_all_units_and_places(name, unit, shift):
+    outline, walls, h = UNEVEN[name]
+
+    def built(unit, shift):
+        lines = [np.multiply(line, unit) + shift for line in (outline, *walls)]
+        return Plan(
+            lines[0], [Divider(line) for line in lines[1:]], edge_length=h * unit, tension=5.0
+        ).surface()
+
+    one, other = built(1.0, 0.0), built(unit, shift)
+    np.testing.assert_array_equal(other.faces, one.faces)
+    moved = one.vertices[:, :2] * unit + shift
+    np.testing.assert_allclose(other.vertices[:, :2], moved, rtol=0, atol=1e-8 * unit)

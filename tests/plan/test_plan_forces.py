@@ -215,8 +215,10 @@ def test_half_and_quarter_of_a_roof_are_the_whole():
         whole = pcmc.solve(pcmc.mirrored(piece), tolerance=1e-13)
         assert whole.surface.m == images * piece.m
         assert images * part.energy == pytest.approx(whole.energy, rel=1e-11)
-        away = pcmc.mirrored(part.surface).vertices - whole.surface.vertices
-        assert np.abs(away).max() < 1e-9 * whole.surface.size
+        images_of_part = pcmc.mirrored(part.surface)
+        assert pcmc.certify(images_of_part).residual < 1e-12
+        # inexact inner steps leave the vertices a little to one side or the other along the surface
+        assert np.abs(images_of_part.vertices - whole.surface.vertices).max() < 1e-6 * whole.surface.size
     plane, mask = quarter.on_planes[0]
     assert plane.mirror
     assert plane.name == "mirror 1"

@@ -50,7 +50,8 @@ def test_four_elements_have_the_shape_of_one(order):
 
 
 def test_a_solver_keeps_the_order():
-    curved = elevate(spherical_cap(0.5), 2)
+    curved = elevate(spherical_cap(0.5), 2.0)  # a whole number, as of a file
+    assert curved.order == 2
     for order in (1, 4):
         with pytest.raises(SurfaceError, match=r"^order: the surface is of order 2 already; give order=2$"):
             solve(curved, order=order)

@@ -102,6 +102,7 @@ BAD = {
     "fixed index": ({"fixed": [0, 7]}, "fixed", 1, r"outside the range 0\.\.4"),
     "fixed below 0": ({"fixed": [-1]}, "fixed", 0, r"outside the range 0\.\.4"),
     "short mask": ({"fixed": np.ones(4, bool)}, "fixed", None, r"\(5,\) for a mask, found \(4,\)"),
+    "mask of 0 and 1": ({"fixed": [1, 1, 0, 0, 0]}, "fixed", None, "give a mask as booleans"),
     "fixed in halves": ({"fixed": [0.5]}, "fixed", 0, r"a whole number, found 0\.5"),
     "fixed huge": ({"fixed": [1e20]}, "fixed", 0, r"a whole number, found 1e\+20"),
     "fixed nan": ({"fixed": [np.nan]}, "fixed", 0, "a whole number"),
