@@ -99,7 +99,7 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
         if not roof[k]:
             add(patch.name, "wall", {"area": float(area[k]), "tension": patch.tension, **weight})
             continue
-        snow = {"snow": patch.snow, "net pressure": patch.net_pressure} if patch.snow else {}
+        snow = {"snow": patch.snow, "net pressure": patch.net_pressure} if surface.snows.any() else {}
         own = {
             "apex": float(height[surface.faces[surface.patch_of_face == k]].max()),
             "area": float(area[k]),

@@ -68,8 +68,8 @@ class Plan:
     rooms : rooms under several patches whose volume is given, instead of their pressure: by name, their
         ``patches`` and ``volume``. For a room under one patch give that patch a ``volume``.
     cushion : a factor: there is a second sheet below, held at the same rim, which has the pressure of the
-        first one and its tension times this factor; 1 for its mirror image in Π, more for a flatter sheet.
-        Each patch NAME has one there called "NAME below".
+        first one and its tension times this factor; 1 for its mirror image in a level rim, more for a
+        flatter sheet. Each patch NAME has one there called "NAME below".
 
     Raises
     ------

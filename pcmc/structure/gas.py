@@ -21,6 +21,7 @@ EVEN = 1e-9  # of a pressure: a smaller difference of two patches' is none
 EXACT = 1e-6  # of the absolute pressure: p V = const holds so well
 MOST_RUNS = 25
 FARTHEST = 0.25  # of the pressure: the most that a run changes it by, before both sides are known
+KEPT = "the file keeps the pressure of the gas; only pcmc.analyse and --run change it with the volume"
 Answer = TypeVar("Answer")
 
 

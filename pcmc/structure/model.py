@@ -24,7 +24,7 @@ from ..surface.lagrange import expect_flat
 from ..surface.parts import Cable
 from ..surface.supports import apply_supports
 from .frames import balancing_force, corner_forces, in_planes
-from .gas import Gas
+from .gas import KEPT, Gas
 from .loads import (
     GRAVITY,
     Load,
@@ -140,12 +140,11 @@ class StructuralModel:
 
     @property
     def note(self) -> str:
-        """The units of the file's numbers in a line, or what was assumed as they are not known."""
-        if self.units:
-            return f"{self.units.sentence}, masses in {self.units.mass}, times in s"
-        if all(load.gravity for load in self.weights):
-            return ""
-        return f"no unit of length is given: gravity is {GRAVITY}, as in metres; give the units or gravity"
+        """The units of the file's numbers, or what was assumed; that its steps keep the pressure of a gas."""
+        known = f"no unit of length is given: gravity is {GRAVITY}, as in metres; give the units or gravity"
+        if self.units or all(load.gravity for load in self.weights):
+            known = f"{self.units.sentence}, masses in {self.units.mass}, times in s" if self.units else ""
+        return "; ".join(filter(None, (known, KEPT if self.gas else "")))
 
     @cached_property
     def materials(self) -> tuple[Material, ...]:

@@ -176,6 +176,17 @@ def test_an_upright_wall_under_different_snow_has_no_error_of_curvature():
     assert found.curvature_error < 1e-9
 
 
+def test_where_snow_lies_on_one_patch_the_others_have_none_as_a_number():
+    """As in the table of patches: a case of a sweep with no snow on one of them has a value there."""
+    areas = {"west": {"tension": 4.0, "snow": 0.3}, "east": {"tension": 4.0}}
+    roof = Plan(
+        [[0, 0], [6, 0], [6, 5], [0, 5]], [[[3, 0], [3, 5]]], edge_length=2.0, patches=areas
+    ).surface()
+    shown = {(f.quantity, f.of): f.value for f in figures(roof, pcmc.certify(roof))}
+    assert [shown["snow", name] for name in areas] == [0.3, 0.0]
+    assert [shown["net pressure", name] for name in areas] == [0.7, 1.0]
+
+
 def test_upright_walls_hold_what_neighbours_of_unequal_tension_leave():
     """A long hall of tensions 5 and 4: far from its ends the plane takes their difference."""
     patches = {"west": {"tension": 5.0}, "east": {"tension": 4.0}}

@@ -168,6 +168,14 @@ def test_snow_lies_on_the_upper_sheet_of_a_cushion():
     assert in_the_open(parts()).all()
 
 
+def test_the_file_says_that_it_keeps_the_pressure_of_a_gas(tmp_path):
+    """Its steps alone are no answer of a roof that is shut in."""
+    cushion = Plan([[0, 0], [4, 0], [4, 3], [0, 3]], edge_length=1.0, tension=1.5, cushion=2.0).surface()
+    for gas, many in ((None, 0), (Gas(ambient=100.0), 1)):
+        pcmc.write_structure(tmp_path / "cushion.inp", model_of(cushion, anyway=True, gas=gas))
+        assert (tmp_path / "cushion.inp").read_text().count("keeps the pressure of the gas") == many
+
+
 def test_snow_lies_on_every_strip_of_a_ridge_of_long_triangles():
     """The middles of neighbours are nearer than a triangle is long, and none is under another."""
     X = [[x, y, z] for y, z in enumerate([0, 1, 2, 1, 0]) for x in (0, 10, 20)]
