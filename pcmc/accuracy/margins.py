@@ -41,7 +41,7 @@ from ..solvers import solve_once
 from ..solvers.continuation import Branch, Ending
 from ..solvers.continuation.branch import follow_until
 from ..solvers.continuation.branch_point import ALONG
-from ..solvers.result import Callback, Progress, Result
+from ..solvers.result import Callback, Progress, Result, unless_stopped
 from ..surface import Surface
 from ..surface.geometry import vertex_area_vectors
 from ..surface.lagrange import expect_flat
@@ -122,7 +122,7 @@ def find_end(
         detail = branch.detail
         # a solve a little beyond its last point tells what a branch that was lost ends by
         beyond = varied.direction.line(there).surface_at(there, factor + sense * BEYOND * max(factor, 1.0))
-        down = solve_once(beyond).certificate.verdict is Verdict.WALL_DOWN
+        down = unless_stopped(solve_once(beyond)).certificate.verdict is Verdict.WALL_DOWN
         kind = MarginEnd.WALL_DOWN if down else MarginEnd.MESH
         if detail.startswith("triangles"):
             worst = there.faces[worst_face(there, standing_part(there).walls.pinchable)[0]]

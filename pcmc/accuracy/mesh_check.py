@@ -22,7 +22,7 @@ from ..meshing.held_curves import doubted_midpoints, held_corners, smooth_midpoi
 from ..meshing.quality import edge_lengths
 from ..meshing.refinement import Projection, refine
 from ..solvers import solve_once
-from ..solvers.result import Callback, Result, Status
+from ..solvers.result import Callback, Result, unless_stopped
 from ..surface import Surface
 from ..surface.lagrange import expect_flat
 from ..surface.pieces import two_digits
@@ -227,9 +227,8 @@ def _solved(start: Surface, callback: Callback | None, stable: bool) -> Result:
     """The surface on a finer mesh, at rest nearby; a ``stable`` one may be so only downhill."""
     results = list[Result]()
     for target in ("stationary", "minimum") if stable else ("stationary",):
-        results.append(solve_once(start, "newton", callback, target=target, iterations=STEPS))
-        if results[-1].status is Status.STOPPED:
-            raise KeyboardInterrupt
+        result = solve_once(start, "newton", callback, target=target, iterations=STEPS)
+        results.append(unless_stopped(result))
         if results[-1].converged:
             return results[-1]
     return results[0]

@@ -136,6 +136,8 @@ class TracedParameter:
                 continue
             if way.ending is Ending.REACHED:
                 return way.last
+            if way.ending is Ending.STOPPED:
+                raise KeyboardInterrupt
             reason = way.message
         return reason
 

@@ -27,6 +27,7 @@ from ..forces.functional import patch_areas
 from ..forces.pinching import standing_part
 from ..forces.rooms import room_pressures, room_volumes
 from ..solvers import solve
+from ..solvers.result import unless_stopped
 from ..stability.equilibrium import Equilibrium
 from ..surface import Surface, expect_surface
 from ..surface.geometry import area_vectors
@@ -185,7 +186,7 @@ def _at_rest(surface: Surface, stretch: Floats | None = None) -> tuple[Surface, 
     """The surface at rest, in the cell stretched by a matrix if one is given; and its certificate."""
     if stretch is not None:
         surface = surface.rebuilt(vertices=surface.vertices @ stretch)
-    result = solve(surface, target="stationary")
+    result = unless_stopped(solve(surface, target="stationary"))
     if not result.converged:
         where = lattice_of(surface).round(6).tolist()
         text = f"free_cell: in the cell {where} the surface does not come to rest: {result.message}"

@@ -28,7 +28,7 @@ from ..meshing.remeshing import remesh
 from ..solvers import solve_once
 from ..solvers.attempt import Log, NewtonOptions, NewtonRun
 from ..solvers.homotopy import MIN_QUALITY
-from ..solvers.result import Result, Status
+from ..solvers.result import Result, Status, unless_stopped
 from ..solvers.state import SolverState
 from ..solvers.steps import LENGTHS, Stepper
 from ..stability.factorisation import SingularMatrix
@@ -65,15 +65,8 @@ def deflated_newton(start: Surface, known: Sequence[Shape]) -> Result | None:
     return None
 
 
-def going_on(result: Result) -> Result:
-    """What a solve gave; KeyboardInterrupt where it was stopped, as that stops the search."""
-    if result.status is Status.STOPPED:
-        raise KeyboardInterrupt
-    return result
-
-
 def _stationary(start: Surface) -> Result | None:
-    result = going_on(solve_once(start, target="stationary"))
+    result = unless_stopped(solve_once(start, target="stationary"))
     return result if result.converged else None
 
 

@@ -22,13 +22,13 @@ from ..forces.loose_parts import part_size
 from ..forces.pinching import standing_part
 from ..solvers import solve
 from ..solvers.continuation import BoundaryMotion, Branch, Direction
-from ..solvers.result import Progress, Result, Status
+from ..solvers.result import Progress, Result, Status, unless_stopped
 from ..solvers.starts import low_start
 from ..surface import Surface, expect_surface
 from ..surface.lagrange import expect_flat
 from .branches import Span, TracedParameter, join_branches
 from .found import Equilibria, FoundEquilibrium, WayDown, pairs
-from .from_known import deflated_newton, going_on, pass_between, way_down, with_good_triangles
+from .from_known import deflated_newton, pass_between, way_down, with_good_triangles
 from .shapes import Shape
 
 MODES = 8  # of the lowest modes a start is displaced along
@@ -195,14 +195,14 @@ class _Search:
     def first(self) -> None:
         """The surface given, solved if necessary, and the minimum from a low start."""
         if self.add(self.surface, "given") is None:
-            result = going_on(solve(self.surface))
+            result = unless_stopped(solve(self.surface))
             if not result.converged:
-                result = going_on(solve(self.surface, target="stationary"))
+                result = unless_stopped(solve(self.surface, target="stationary"))
             if not result.converged:
                 text = f"find_equilibria: no equilibrium was found to begin with; {result.message}"
                 raise SurfaceError(text, what="surface", found=result.status.name)
             self.add(result.surface, "from the start given")
-        if (low := low_start(self.surface)) is not None and (result := going_on(solve(low))).converged:
+        if (low := low_start(self.surface)) is not None and (result := unless_stopped(solve(low))).converged:
             self.add(with_good_triangles(result.surface), "from a low start")
 
     def add(self, surface: Surface, how: str) -> int | None:

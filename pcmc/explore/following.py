@@ -18,6 +18,7 @@ from ..base import validate
 from ..base.arrays import Floats
 from ..base.errors import MissingExtra, PcmcError
 from ..certificate import Certificate, Verdict
+from ..project.outcome import OnStep
 from ..project.values import changeable_values, data_with_values, single_points
 from ..solvers import solve_once
 from ..solvers.result import Progress, Result
@@ -30,7 +31,6 @@ FIRST_ATTEMPTS = 4  # of following, before the project's own walls are tried
 START_SECONDS = 6.0  # time limit of solving from the start shape
 Values = Mapping[str, Mapping[str, Any]]  # numbers by kind and name; and points, each [x, y, z]
 Stop = Callable[[], bool]
-Progressed = Callable[[str], None]  # called with a line for each step
 
 
 def until(stop: Stop, seconds: float) -> Stop:
@@ -127,7 +127,7 @@ class ProjectFallback:
         return replace(self, given=self.given | _walls(surface))
 
     def settle(
-        self, here: Surface, asked: Surface, stop: Stop, seconds: float, progress: Progressed, **options: Any
+        self, here: Surface, asked: Surface, stop: Stop, seconds: float, progress: OnStep, **options: Any
     ) -> tuple[Reached, str, ProjectFallback]:
         """Follow to ``asked``; else with the project's walls, in small steps, and from its start shape.
 

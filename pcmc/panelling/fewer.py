@@ -23,6 +23,7 @@ from ..forces.motion_space import motion_space, perpendicular
 from ..forces.pinching import place_wall_rows, standing_part
 from ..meshing.quality import turns_over, worst_quality
 from ..solvers import solve_once
+from ..solvers.result import unless_stopped
 from ..surface import Surface
 from ..surface.distance import distances
 from ..surface.geometry import edge_vectors
@@ -192,7 +193,7 @@ class _Search:
             return None
         surface = self.best.moved(X)
         if self.at_rest:
-            result = solve_once(surface, target="stationary")
+            result = unless_stopped(solve_once(surface, target="stationary"))
             if not result.converged or result.certificate.certified is not self.certified:
                 return None
             surface = result.surface

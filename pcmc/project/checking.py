@@ -16,6 +16,7 @@ from .keys import KINDS, OR_CURVE, REQUIRED, Section, fits, main_sections, solve
 
 LONGEST = 1023  # bits of a float's exponent
 VALUE = re.compile(r"(?<![\w.])[-+]?(?:\d[\d_]*\.?\d*(?:[eE][-+]?\d+)?|inf|nan)(?![\w.])")  # of TOML
+PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""  # of a key of TOML
 Place = tuple[str, ...]  # the keys that lead to a table or a value
 
 
@@ -119,7 +120,7 @@ def line_of(text: str, place: Place, key: str, value: Any = None) -> int:
     lines = []  # how badly each fits, and its number
     for number, line in enumerate(text.splitlines(), 1):
         if head := re.match(r"\s*\[\[?([^\[\]]+)\]\]?\s*(#|$)", line):
-            header = tuple(part.strip(" \"'") for part in head[1].split("."))
+            header = tuple(part.strip("\"'") for part in re.findall(PART, head[1]))
             if header == (*place, key):
                 lines.append((False, False, number))
         elif named.search(line.split("#")[0]) and header == place[: len(header)]:

@@ -25,15 +25,14 @@ from ..plan.drawing import Drawing
 from ..plan.proposal import edge_length_for
 from ..solvers import find_method
 from ..structure.section import Structure, check_members
-from .checking import check_project_keys, in_file
+from .checking import PART, check_project_keys, in_file
 from .drawn import Chosen, check_beside, is_drawing, leads_outside, with_drawing
 from .settings import AccuracyWanted, MeshFile, Output, Remeshing, section_of
 
 TOML = ".toml"
 ELSEWHERE = "name files in it, and give --folder to write them elsewhere"
 LARGEST = 4_000_000  # bytes of a project file
-_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
-DEEP = re.compile(rf"(?<![\w\"'-])(?:{_PART}[ \t]*\.[ \t]*){{30}}")  # TOML's reader takes its square
+DEEP = re.compile(rf"(?<![\w\"'-])(?:{PART}[ \t]*\.[ \t]*){{30}}")  # TOML's reader takes its square
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from ..surface import Surface
 from . import solve_once
 from .continuation import BoundaryMotion, Branch, Direction, Ending
 from .continuation.branch import follow_until
-from .result import Callback, Progress, Result, Status
+from .result import Callback, Progress, Result, Status, unless_stopped
 from .starts import low_start
 
 BACK = 0.03  # of the farthest value: how far behind a turn a way down may open, and the branch is followed
@@ -81,7 +81,7 @@ class Solves:
     evaluations: int = 0
 
     def solve(self, surface: Surface, **changes: Any) -> Result:
-        """Solve from one start; StopIteration if stopped, LimitReached at the limit asked for."""
+        """Solve from one start; KeyboardInterrupt if stopped, LimitReached at the limit asked for."""
         before = self.steps
 
         def count(progress: Progress) -> None:
@@ -90,8 +90,7 @@ class Solves:
         result = solve_once(surface, "newton", count, **{**self.options, **changes})
         self.steps = before + len(result.rows)
         self.evaluations += result.evaluations
-        if result.status is Status.STOPPED:
-            raise StopIteration
+        unless_stopped(result)
         rows = [{**row, "iteration": before + row["iteration"]} for row in result.rows]
         steps, evaluations = self.steps - 1, self.evaluations
         result = replace(result, rows=[*self.before, *rows], iterations=steps, evaluations=evaluations)

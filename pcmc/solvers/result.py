@@ -182,3 +182,10 @@ def until_stopped(run: Callable[[], End], stopped: End) -> End:
     except (StopIteration, KeyboardInterrupt) as error:
         stop_requested(error)
         return stopped
+
+
+def unless_stopped(result: Result) -> Result:
+    """What a solve gave; KeyboardInterrupt where it was stopped, as that stops what it is a part of."""
+    if result.status is Status.STOPPED:
+        raise KeyboardInterrupt
+    return result

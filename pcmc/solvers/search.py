@@ -38,7 +38,7 @@ def search(surface: Surface, first: Result, callback: Callback | None, options: 
         return _search(start, first, solves)
     except LimitReached as reached:
         return reached.result
-    except (StopIteration, KeyboardInterrupt):  # a mistake in a callback has become a RuntimeError below
+    except KeyboardInterrupt:
         return replace(first, status=Status.STOPPED, evaluations=solves.evaluations)
 
 

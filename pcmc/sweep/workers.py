@@ -120,8 +120,7 @@ def run_case(team: str, case: str, parameters: Mapping[str, Any], time_limit: fl
         started = datetime.now(UTC).isoformat(timespec="milliseconds")
         try:
             task = case, parameters, time_limit
-            outcome: dict[str, Any] = process.call(SCRIPT, "answer_case", *task, limit=limit)
-            return outcome
+            return process.call(SCRIPT, "answer_case", *task, limit=limit)
         except ChildError as death:
             code = death.code or 0
             cause = SIGNALS.get(code, f"{'signal' if code < 0 else 'exit code'} {abs(code)}")

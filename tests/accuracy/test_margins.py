@@ -1,6 +1,7 @@
 """How far from the edge: closed forms, and Surface Evolver just below and just above a fold."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,9 @@ from pcmc.accuracy import MarginEnd
 from pcmc.accuracy.margins import End
 from pcmc.accuracy.varied import Varied, named
 from pcmc.base.errors import OptionError, SurfaceError
+from pcmc.solvers import solve_once
+from pcmc.solvers.continuation import Ending, follow
+from pcmc.solvers.result import Status
 from studies.reference import evolver
 
 
@@ -36,6 +40,19 @@ def test_a_cap_folds_as_a_hemisphere(what, exact):
     assert abs(found.factor - exact) <= found.bar
     assert abs(found.limit - exact) <= found.limit_bar
     assert np.ptp(found.surface.vertices[:, 2]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_ctrl_c_while_the_end_of_a_lost_branch_is_looked_at_ends_the_margin(monkeypatch):
+    def lost(_, callback, surface, *given, **options):
+        return replace(follow(surface, *given, **options | {"steps": 2}), ending=Ending.LOST)
+
+    def stopped(surface):
+        return replace(solve_once(surface), status=Status.STOPPED)
+
+    monkeypatch.setattr("pcmc.accuracy.margins.follow_until", lost)
+    monkeypatch.setattr("pcmc.accuracy.margins.solve_once", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        margin(cap(edge_length=0.6), "pressure", meshes=1)
 
 
 def test_a_coarse_end_that_does_not_settle_yet_has_no_bar(monkeypatch):

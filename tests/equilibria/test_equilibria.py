@@ -27,7 +27,7 @@ from pcmc.equilibria.found import Equilibria, WayDown
 from pcmc.explore.page_data import equilibria_data
 from pcmc.forces.functional import patch_areas
 from pcmc.plot import uses
-from pcmc.solvers.continuation import Branch
+from pcmc.solvers.continuation import Branch, Ending
 from pcmc.solvers.result import Status
 
 SMALL, LARGE = spherical_cap_exact(), spherical_cap_exact(upper=True)
@@ -323,6 +323,16 @@ def test_ctrl_c_in_a_solve_ends_the_search(monkeypatch, module, name, count):
     assert found.stopped
     assert len(stopped) == 1
     assert len(found) == count
+
+
+def test_ctrl_c_on_the_way_to_the_present_value_ends_the_search(monkeypatch):
+    def stopped(branch, row, stop):
+        return replace(branch, ending=Ending.STOPPED)
+
+    monkeypatch.setattr(Branch, "resume", stopped)
+    found = find_equilibria(spherical_cap(0.35), "pressure", starts=0)
+    assert found.stopped
+    assert not found.failed
 
 
 def test_a_search_ends_at_the_most_equilibria_that_are_wanted():

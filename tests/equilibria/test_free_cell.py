@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from generators import kelvin_foam, minimal_cell, weaire_phelan_foam
 from pcmc import Patch, Room, Surface, cell_stress, free_cell, images_in, solve
 from pcmc.base.errors import OptionError, SurfaceError
 from pcmc.forces.functional import patch_areas
+from pcmc.solvers.result import Status
 from pcmc.surface.images import lattice_of
 from studies.orders import richardson, slope
 
@@ -115,6 +117,15 @@ def test_what_rounding_leaves_of_the_pressure_on_a_film_is_no_given_one():
 def test_where_no_size_balances_the_pressure_the_nearest_that_does_is_named(pressure):
     with pytest.raises(OptionError, match=r"found no cell for a pressure of .* pass pressure=-1\.609,"):
         free_cell(minimal_cell("P", 1), pressure, free="size")
+
+
+def test_ctrl_c_in_a_solve_ends_the_search_for_a_cell(monkeypatch):
+    def stopped(surface, **options):
+        return replace(solve(surface, **options), status=Status.STOPPED)
+
+    monkeypatch.setattr(import_module("pcmc.equilibria.free_cell"), "solve", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        free_cell(kelvin_foam(1))
 
 
 def test_of_a_surface_that_is_not_at_rest_there_is_no_stress():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -21,6 +22,7 @@ from pcmc.panelling.families import triangle_families
 from pcmc.plan import Plan
 from pcmc.report.tables import MOST_FAMILIES
 from pcmc.report.words import panel_text
+from pcmc.solvers.result import Status
 from pcmc.surface.distance import distances
 from pcmc.surface.geometry import edge_vectors, face_areas
 from studies.questions import panel_families
@@ -269,6 +271,15 @@ def test_the_optimiser_without_rest_reports_what_it_costs(squares):
     assert 0.0 < result.change <= 0.005
     assert result.after.certificate.curvature_error > 1e-4 > result.before.certificate.curvature_error
     assert "not_converged" in str(result)
+
+
+def test_ctrl_c_in_the_solve_of_a_round_ends_the_search(squares, monkeypatch):
+    def stopped(surface, **options):
+        return replace(pcmc.solvers.solve_once(surface, **options), status=Status.STOPPED)
+
+    monkeypatch.setattr("pcmc.panelling.fewer.solve_once", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        pcmc.fewer_families(squares, 0.01, 0.02)
 
 
 def test_too_little_room_leaves_the_surface_as_it_is(squares):

@@ -40,6 +40,7 @@ class Page {
       .catch((error) => (known && !location.search ? ask("api/open") : Promise.reject(error)));
     this.name = answer.header.session;
     this.startViewer();
+    this.addChoices();
     this.variants = new Variants(find("#variants"), (name, body) => this.act(name, body), () => this.viewer?.drawn());
     this.begin(answer);
     this.addExports(answer.header.formats);
@@ -223,7 +224,10 @@ class Page {
       this.compared = header.compared;
       this.choice = header.compared === null ? "patches" : "difference";
     }
-    this.addChoices();
+    for (const radio of document.querySelectorAll("#colours input")) {
+      radio.checked = radio.value === this.choice;
+      radio.parentElement.hidden = radio.value === "difference" && !arrays.difference;
+    }
     this.colour();
   }
 
@@ -295,16 +299,9 @@ class Page {
   // -- controls ------------------------------------------------------------------------------------
 
   addChoices() {
-    const possible = Object.keys(COLOURS).filter((name) => name !== "difference" || this.arrays.difference);
-    const known = [...document.querySelectorAll("#colours input")];
-    if (known.map((radio) => radio.value).join() === possible.join()) {
-      for (const radio of known) radio.checked = radio.value === this.choice;
-      return; // the one in use keeps the focus
-    }
-    find("#colours").replaceChildren(...possible.map((name) => choice(
-      "radio", COLOURS[name].label, name === this.choice, () => { this.choice = name; this.colour(); },
-      { name: "colour", value: name })));
-    find("#shows").replaceChildren(...Object.entries(SHOWS).map(([name, label]) => choice(
+    find("#colours").append(...Object.entries(COLOURS).map(([value, { label }]) => choice(
+      "radio", label, false, () => { this.choice = value; this.colour(); }, { name: "colour", value })));
+    find("#shows").append(...Object.entries(SHOWS).map(([name, label]) => choice(
       "checkbox", label, this.viewer?.options[name], (on) => this.viewer?.setOptions({ [name]: on }),
       { name, value: name })));
   }

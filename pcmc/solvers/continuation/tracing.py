@@ -18,7 +18,7 @@ from ...meshing.quality import redistribute, turns_over
 from ...meshing.remeshing import remesh
 from ...surface import Surface
 from .. import solve_once
-from ..result import Callback, Progress, Status
+from ..result import Callback, Progress, unless_stopped
 from .branch_point import (
     BranchPoint,
     ContactChanged,
@@ -195,9 +195,7 @@ class Tracer:
         part = near.rest.part
         whole = part.whole_at(part.landed(near.X, near.mesh.reaches_plane(near.X)))
         given = {"tolerance": self.options.tolerance, "backend": self.options.backend}
-        result = solve_once(whole, target="stationary", **given)
-        if result.status is Status.STOPPED:  # solvers turn Ctrl-C into a status
-            raise KeyboardInterrupt
+        result = unless_stopped(solve_once(whole, target="stationary", **given))
         if not result.converged:
             raise NotOnBranch(f"contact of a wall with the plane changes, and {result.message}")
         mesh = self.mesh(result.surface)
