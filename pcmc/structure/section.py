@@ -304,8 +304,9 @@ class Structure:
             return structure.check(whole, plan)
         self.thicknesses(surface)
         _name_oblique_warps(of := self.materials(surface), surface)
-        every = ((p, of[p.name] if isinstance(of, Mapping) else of) for p in surface.patches if p.weight)
-        if twice := [patch.name for patch, own in every if own.density]:
+        heavy = [part.name for part in (*surface.patches, *surface.cables) if part.weight]
+        own = of if isinstance(of, Mapping) else dict.fromkeys(heavy, of)
+        if twice := [name for name in heavy if own.get(name, self.material).density]:
             text = f"{twice[0]!r} has a weight, under which it is at rest; self-weight by its density comes"
             warnings.warn(f"{text} on top; if both are the same, leave one out", LoadWarning, stacklevel=3)
         members = members_of(self.members, plan)

@@ -6,7 +6,7 @@ import pytest
 from refusals import refused
 from structures import model_of, pyramid
 
-from pcmc import Material, SelfWeight, Snow, Wind
+from pcmc import Cable, Material, SelfWeight, Snow, Wind
 from pcmc.base.errors import LoadWarning, OptionError
 from pcmc.project import Structure
 
@@ -74,4 +74,7 @@ def test_a_weight_and_a_density_of_one_patch_are_told():
     with pytest.warns(LoadWarning, match=told):
         Structure(young=1e6, thickness=0.001, density=1.0).check(roof)
     Structure(young=1e6, thickness=0.001).check(roof)
+    roped = pyramid().rebuilt(cables=[Cable("rope", 1.0, [[0, 4]], weight=0.1)])
+    with pytest.warns(LoadWarning, match="'rope' has a weight"):
+        Structure(young=1e6, thickness=0.001, density=1.0, cable_area=1e-4).check(roped)
     Structure(young=1e6, thickness=0.001, density=1.0).check(pyramid())
