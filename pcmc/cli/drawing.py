@@ -18,7 +18,7 @@ from ..io import FORMATS
 from ..panelling.panel_net import check_grid
 from ..plot import families, panel_planarity
 from ..project.drawn import files_of
-from ..project.settings import Output, cost_paths, schedule_paths
+from ..project.settings import SCHEDULE_TABLES, Output, cost_paths
 from ..project.writing import certified_files, check_outputs, cost_jobs, schedule_jobs, write_all
 from . import arguments, reports
 from .arguments import MANY_FILES, OUTPUT, Build, FileUnits, Input, MeshCheck, SheetFormat, ViewName
@@ -101,7 +101,7 @@ def panels_(
         if (suffix := path.suffix.lower()) not in (CSV, *FORMATS):
             text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
             raise FileError(text, what=str(path), found=suffix)
-        outputs += schedule_paths(path) if suffix == CSV else [path]
+        outputs += table_paths(path, SCHEDULE_TABLES)
         outputs += cost_paths(path) if suffix == CSV and prices is not None else []
     check_outputs(outputs, inputs=files_of(file), pictures=[picture])
     how: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": build.allow_uncertified}

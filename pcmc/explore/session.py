@@ -222,7 +222,7 @@ class Session:
         late = until(stop, FOLLOW_SECONDS * (1.0 + state.wanted.m / 50_000))
         way = reach(state.surface, state.wanted, late, attempts=2, **FOLLOW)
         failed = way.failed if way.certificate is None else None
-        return state if stop() else state.following(replace(way, failed=failed), way.certificate)
+        return state if stop() else state.following(way._replace(failed=failed), way.certificate)
 
     @act(moves=True)
     def settle(self, state: SessionState, stop: Stop, values: Values) -> SessionState:
