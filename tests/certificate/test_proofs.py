@@ -314,7 +314,7 @@ def test_a_fault_on_a_branch_is_not_a_branch_that_does_not_start(monkeypatch):
     def broken(*_, **__):
         raise SurfaceError("a fault")
 
-    monkeypatch.setattr(homotopy, "follow", broken)
+    monkeypatch.setattr(homotopy, "follow_until", broken)
     with pytest.raises(SurfaceError, match="a fault"):
         solve(spherical_cap(0.25, alpha=0.45))
 
