@@ -205,7 +205,6 @@ class Mast(NamedTuple):
         return np.array([x, y, round(z - over, digits) if over else z])
 
     def radius(self, share: float) -> float:
-        """The radius of a ring around it."""
         return two_digits(max(share * self.clearance, self.least))
 
 

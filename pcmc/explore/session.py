@@ -52,7 +52,6 @@ class Variant:
 
     @cached_property
     def data(self) -> dict[str, Any]:
-        """Its name and key figures."""
         return {"name": self.name, "figures": figures_data(self.surface, self.certificate)}
 
 
@@ -299,7 +298,6 @@ class Session:
 
     @act()
     def forget(self, state: SessionState, stop: Stop, number: int) -> SessionState:
-        """Remove a variant."""
         gone, compared = state.variant(number), state.compared
         if compared is not None and compared >= number:
             compared = None if compared == number else compared - 1

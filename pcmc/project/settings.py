@@ -252,7 +252,6 @@ class Output:
 
     @property
     def names(self) -> list[str]:
-        """The names of the files, as they are given."""
         return [str(name) for key in (*LISTS, *SINGLE) for name in self.files_of(key)]
 
     @property
@@ -264,7 +263,6 @@ class Output:
         return paths
 
     def in_folder(self, folder: Path) -> Output:
-        """The same output in a folder."""
         lists: dict[str, Any] = {name: [folder / path for path in getattr(self, name)] for name in LISTS}
         lists |= {name: folder / path for name in SINGLE if (path := getattr(self, name)) is not None}
         return replace(self, **lists)
