@@ -183,8 +183,8 @@ def columns_in(table: pd.DataFrame, units: Mapping[str, str]) -> Columns:
     {'x, m': ['691006.400']}
     """
     pairs = [(key, unit) for keys, unit in units.items() for key in keys.split()]
-    far = [key for key, _ in pairs if key in PLACES and table[key].abs().max() >= 1e5]  # those of a survey
-    return {f"{k.replace('_', ' ')}, {unit}": column(table[k], 9 if k in far else DIGITS) for k, unit in pairs}
+    far = {key: 9 for key, _ in pairs if key in PLACES and table[key].abs().max() >= 1e5}  # of a survey
+    return {f"{k.replace('_', ' ')}, {unit}": column(table[k], far.get(k, DIGITS)) for k, unit in pairs}
 
 
 def small(value: float) -> str:
