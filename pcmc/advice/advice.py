@@ -53,15 +53,12 @@ def chosen_values(plan: Plan | None, drawn: str, surface: Surface, changed: Surf
     if plan is None:
         return []
     left_open = [divider for divider in plan.dividers if divider.wall == BALANCED]
-    pairs = list(zip(surface.patches, changed.patches, strict=True))
-    same = [a.tension == b.tension for a, b in pairs]
-    chosen = [
-        a
-        for (a, _), kept in zip(pairs, same, strict=True)
-        if kept and any(_is_wall_of(divider, a.name) for divider in left_open)
-    ]
+    pairs = zip(surface.patches, changed.patches, strict=True)
+    kept = [a for a, b in pairs if a.tension == b.tension]
+    chosen = [a for a in kept if any(_is_wall_of(divider, a.name) for divider in left_open)]
     values = ", ".join(f"{patch.name!r} {patch.tension:g}" for patch in chosen)
-    what = "balanced with their neighbours" if all(same) else "that balance the tensions of the file"
+    all_kept = len(kept) == len(surface.patches)
+    what = "balanced with their neighbours" if all_kept else "that balance the tensions of the file"
     balanced = f"walls {what}: {values} (to choose one, type wall = under its divider)" if chosen else ""
     return [text for text in (drawn, balanced) if text]
 

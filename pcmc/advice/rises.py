@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -165,8 +165,7 @@ SHARES = (0.12, 0.25, 0.4, 0.55)  # radii of rings, of the way from a point to t
 LEAST_RING = 0.25  # smallest radius of a ring over the length of edges
 
 
-@dataclass(frozen=True, eq=False)
-class Mast:
+class Mast(NamedTuple):
     """A point inside the plan that holds the roof."""
 
     number: int  # its place among the plan's supports
@@ -206,7 +205,6 @@ class Mast:
         return np.array([x, y, round(z - over, digits) if over else z])
 
     def radius(self, share: float) -> float:
-        """The radius of a ring around it."""
         return two_digits(max(share * self.clearance, self.least))
 
 

@@ -157,13 +157,13 @@ def choice(name: str, value: object, known: Sequence[str]) -> str:
     return str(value)
 
 
-def option(default: Any, check: Callable[..., object], **limits: object) -> Any:
+def limited(default: Any, check: Callable[..., object], **limits: object) -> Any:
     """A field of an options dataclass, with the check of this module that ``check_options`` makes of it."""
     return field(default=default, metadata={"check": partial(check, **limits)})
 
 
 def check_options(options: DataclassInstance) -> None:
-    """Refuse values that the ``option`` fields of a dataclass do not allow; their type may allow None."""
+    """Refuse values that the ``limited`` fields of a dataclass do not allow; their type may allow None."""
     for each in fields(options):
         value, check = getattr(options, each.name), each.metadata.get("check")
         if check is not None and not (value is None and "None" in str(each.type)):

@@ -260,7 +260,7 @@ class Certificate:
         head = "\n".join(f"{name:>20}  {text}" for name, text in rows if text)
         supports = self.supports.drop(columns=[*MOMENT])
         shown = self.patches, self.rooms, self.junctions, supports, self.cables, self.cable_ends
-        texts = [t.to_string(index=False, float_format=lambda x: f"{x:.4g}") for t in shown if len(t)]
+        texts = [tables.as_text(table, self.acting.surface.size) for table in shown if len(table)]
         return "\n\n".join([head, *texts])
 
     __repr__ = text

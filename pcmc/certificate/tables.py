@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -24,6 +25,7 @@ from ..surface.topology import EdgeCurve
 from .forces import CableEnd, cable_parts, sheet_pulls
 
 ROUNDING = 1e-8  # of the size, about what a solve leaves: a coordinate below is 0
+PLACES = ("x", "y", "z", "middle_x", "middle_y", "middle_z")  # columns of coordinates
 THIN = 1e-6  # of the wall's mean triangle: smaller ones have no direction worth telling
 
 
@@ -61,6 +63,19 @@ def middle(surface: Surface, curve: EdgeCurve) -> dict[str, float]:
         place = np.array([np.interp(0.5 * along[-1], along, column) for column in points.T])
     place = np.where(np.abs(place) <= ROUNDING * surface.size, 0.0, place)
     return {f"middle_{axis}": float(value) for axis, value in zip("xyz", place, strict=True)}
+
+
+def as_text(table: pd.DataFrame, size: float) -> str:
+    """A table in four digits; places far from the origin of a surface of this size as its points have them.
+
+    >>> print(as_text(pd.DataFrame({"x": [691003.125], "y": [2.0], "force_x": [12345.678]}), 12.0))
+           x  y   force_x
+    691003.125  2 1.235e+04
+    """
+    digits = 4 - math.floor(math.log10(size or 1.0))
+    far = [name for name in table if name in PLACES and table[name].abs().max() >= 1e4]
+    formats: Any = dict.fromkeys(far, lambda x: f"{round(x, digits):.12g}")
+    return table.to_string(index=False, float_format=lambda x: f"{x:.4g}", formatters=formats)
 
 
 def patch_table(surface: Surface, standing: Surface) -> pd.DataFrame:

@@ -21,8 +21,8 @@ from ..base.files import check_regular
 from ..base.units import LENGTHS
 from ..io import FORMATS, READ_ONLY
 from ..project import Outcome, Output, Project
-from ..project.drawn import files_of
-from ..project.file import is_project
+from ..project.drawn import DXF, files_of
+from ..project.file import TOML, is_project
 from ..project.outcome import MOST_CHECKED, OnStep
 from ..project.varied import with_loads
 from ..project.writing import check_outputs
@@ -30,7 +30,6 @@ from ..surface import Surface
 from ..surface.values import in_the_open, sheets_below
 from .options import by_part, option, parsed_unit, switch
 
-TOML, DXF = ".toml", ".dxf"
 READ = (TOML, *FORMATS, *READ_ONLY, DXF)  # suffixes of what commands read
 
 EVERY = "A bare VALUE applies to every patch that is not named"
@@ -152,10 +151,11 @@ def load_project(file: Path, units: str = "") -> Project:
     return projects.load(file, units=units)
 
 
-def output_of(file: Path, **output: Any) -> Output:
-    """What a command writes, in the terms of a project; refused before any work if it cannot be written."""
+def output_of(file: Path, *more: Path, **output: Any) -> Output:
+    """What a command writes, in the terms of a project, and ``more`` files; refused before any work if these
+    cannot be written."""
     wanted = Output(**output)
-    check_outputs(wanted.paths, inputs=files_of(file), pictures=[wanted.picture])
+    check_outputs([*wanted.paths, *more], inputs=files_of(file), pictures=[wanted.picture])
     return wanted
 
 

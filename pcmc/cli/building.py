@@ -75,10 +75,8 @@ def structure(
             if project.structure is not None:
                 own = project.structure.thicknesses(start)
                 thick = (own if isinstance(own, dict) else dict.fromkeys(patches, own)) | thick
-                values["patches"] = {  # their own would count for more
-                    name: {key: value for key, value in table.items() if key != "thickness"}
-                    for name, table in values["patches"].items()
-                }
+                for table in values["patches"].values():
+                    table.pop("thickness", None)  # their own would count for more
             alike = thick.keys() == {*patches} and len({*thick.values()}) == 1  # one number, not one by patch
             values["thickness"] = thick[patches[0]] if alike else thick
         if given.wind:

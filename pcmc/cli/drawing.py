@@ -13,19 +13,17 @@ from ..base.errors import FileError, OptionError
 from ..base.files import suffix_of
 from ..base.units import Units
 from ..certificate.certificate import require_certified
-from ..drawings.drawing_set import NET_SUFFIXES, NET_TABLES, net_files, table_paths
+from ..drawings.drawing_set import CSV, NET_SUFFIXES, NET_TABLES, net_files, table_paths
 from ..io import FORMATS
 from ..panelling.panel_net import check_grid
 from ..plot import families, panel_planarity
-from ..project.drawn import files_of
-from ..project.settings import Output, cost_paths, schedule_paths
-from ..project.writing import certified_files, check_outputs, cost_jobs, schedule_jobs, write_all
+from ..project.settings import SCHEDULE_TABLES, Output, cost_paths
+from ..project.writing import certified_files, cost_jobs, schedule_jobs, write_all
 from . import arguments, reports
 from .arguments import MANY_FILES, OUTPUT, Build, FileUnits, Input, MeshCheck, SheetFormat, ViewName
 from .options import amount, count, option, parsed_number, switch
 from .reports import working
 
-CSV = ".csv"
 FAMILY = "Largest difference of edges within a family of triangles."
 PATTERN = "planar-quads along lines of curvature; quads or hexagons of a grid in plan."
 GRID = "Direction of a grid in plan, from x; by default the project's, or 0."
@@ -96,14 +94,14 @@ def panels_(
         raise OptionError("--cost: prices what --change finds; give --change, too", what="--cost")
     for price in prices or ():
         validate.number("--cost", price, least=0.0)
-    outputs = Output(picture=picture, view=seen).paths
+    outputs: list[Path] = []
     for path in files:
         if (suffix := path.suffix.lower()) not in (CSV, *FORMATS):
             text = f"{path}: expected {CSV} for a schedule, or a format of surfaces: {', '.join(FORMATS)}"
             raise FileError(text, what=str(path), found=suffix)
-        outputs += schedule_paths(path) if suffix == CSV else [path]
+        outputs += table_paths(path, SCHEDULE_TABLES)
         outputs += cost_paths(path) if suffix == CSV and prices is not None else []
-    check_outputs(outputs, inputs=files_of(file), pictures=[picture])
+    arguments.output_of(file, *outputs, picture=picture, view=seen)
     how: dict[str, Any] = {"mirror_images": mirror_images, "walls": walls, "anyway": build.allow_uncertified}
     with working() as progress:
         roof = build.roof(arguments.load_project(file), progress)
@@ -150,9 +148,8 @@ def _net(
         suffix_of(path, NET_SUFFIXES, "a net of panels")
     size, pattern, given = wanted
     check_grid(pattern, given or 0.0)
-    outputs = Output(picture=picture, view=seen, sheet=sheet or "A1").paths
-    outputs += [one for path in files for one in table_paths(path, NET_TABLES)]
-    check_outputs(outputs, inputs=files_of(file), pictures=[picture])
+    tables = [one for path in files for one in table_paths(path, NET_TABLES)]
+    arguments.output_of(file, *tables, picture=picture, view=seen, sheet=sheet or "A1")
     with working() as progress:
         project = arguments.load_project(file, units)
         own = given is None and pattern != "planar-quads"

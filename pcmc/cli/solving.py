@@ -32,7 +32,7 @@ from ..sweep import Sweep, draw_sweep, run, short_table, solve_case, write_table
 from ..sweep.projects import column_labels, project_sweep
 from ..sweep.solving import digest_of
 from ..sweep.store import FAILED
-from ..sweep.tables import TABLES, columns_of
+from ..sweep.tables import GOOD, TABLES, columns_of
 from . import INTERRUPTED, NOT_CERTIFIED, OK, arguments, reports
 from .arguments import MANY_FILES, READ, Cache, FileUnits, Input, Loads, MeshCheck, Shown, Uncertified, Whole
 from .options import amount, count, option, switch
@@ -295,7 +295,7 @@ def sweep(
         print(f"case {alike.index[0]}{others}: {alike['status'].iloc[0]}: {message}")
     if len(table) < len(cases):
         return INTERRUPTED
-    good = table["verdict"].isin(["stable", "neutral"]) & table.get("targets_met", True)
+    good = table["verdict"].isin(GOOD) & table.get("targets_met", True)
     return OK if (good & table.get("accuracy_reached", True)).all() else NOT_CERTIFIED
 
 

@@ -199,8 +199,12 @@ class CuttingOptions:
         """
         if (stiffness := self.of_patch("stiffness", patch)) is not None:
             (warp, weft), poisson = stiffness, self.of_patch("poisson", patch)
-            along, across = (1.0 - poisson) / warp, 1.0 / weft - poisson / warp
-            return 1.0 / (1.0 + tension * along), 1.0 / (1.0 + tension * across)
+            along, across = tension * (1.0 - poisson) / warp, tension * (1.0 / weft - poisson / warp)
+            cut = 1.0 / (1.0 + along), 1.0 / (1.0 + across)
+            for part in cut:
+                what = f"compensation of {patch!r}, from its stiffness"
+                validate.number(what, 100.0 * (1.0 - part), **NUMBERS["compensation"])
+            return cut
         warp, weft = self.compensation or (0.0, 0.0)
         return 1.0 - warp / 100.0, 1.0 - weft / 100.0
 

@@ -17,10 +17,9 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
 from socketserver import ThreadingMixIn
-from typing import Any
+from typing import Any, NamedTuple
 from xmlrpc.server import SimpleXMLRPCRequestHandler
 
 from ..base import validate
@@ -43,8 +42,7 @@ STARTS = 600  # of Proxy, a tenth of a second each: the first import after an in
 MESH = "compas.datastructures/Mesh"
 
 
-@dataclass(frozen=True)
-class Settings:
+class Settings(NamedTuple):
     """Who may call, and what is read and written."""
 
     folder: Path  # that ``read`` and ``write`` are kept in

@@ -36,8 +36,6 @@ WIDTH = 0.72  # of a letter, in its height, for what must fit
 
 
 class SheetLayer(NamedTuple):
-    """A layer of a drawing."""
-
     color: int  # by AutoCAD's index
     weight: int  # width of its lines, 1/100 mm
     about: str  # what it holds

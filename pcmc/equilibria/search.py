@@ -15,7 +15,7 @@ from ..base import validate
 from ..base.errors import NoBranch, OptionError, SurfaceError
 from ..base.interrupts import stop_requested
 from ..base.tolerances import AT_REST
-from ..base.validate import check_options, flag, integer, option
+from ..base.validate import check_options, flag, integer, limited
 from ..certificate import certify
 from ..certificate.verdict import only_coarse
 from ..forces.loose_parts import part_size
@@ -66,11 +66,11 @@ class SearchOptions:
     """
 
     span: Span | None = None
-    starts: int = option(6, integer)
-    depth: int = option(2, integer)
-    most: int = option(24, integer, least=1)
-    seed: int = option(0, integer)
-    mesh_check: bool = option(False, flag)
+    starts: int = limited(6, integer)
+    depth: int = limited(2, integer)
+    most: int = limited(24, integer, least=1)
+    seed: int = limited(0, integer)
+    mesh_check: bool = limited(False, flag)
 
     def __post_init__(self) -> None:
         check_options(self)

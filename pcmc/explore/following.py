@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,8 +49,7 @@ def solve_until(surface: Surface, stop: Stop, **options: Any) -> Result:
     return solve_once(surface, callback=check, **options)
 
 
-@dataclass(frozen=True, eq=False)
-class Reached:
+class Reached(NamedTuple):
     """The last surface at rest on the way to other values, and the failed attempt after it, if any."""
 
     surface: Surface
@@ -152,7 +151,7 @@ class ProjectFallback:
                 note = f"walls balanced beside the new tensions: {tensions}"
                 return balanced, note, replace(self, given=self.given | new)
         rest = reach(way.surface, asked, late, **options)
-        rest = replace(rest, certificate=rest.certificate or way.certificate)
+        rest = rest._replace(certificate=rest.certificate or way.certificate)
         if rest.failed is None or start is None or stop():
             return rest, "" if rest.failed is None else note, self
         progress("from the start shape")

@@ -96,8 +96,6 @@ def listen(host: str, port: int, handler: type[BaseHTTPRequestHandler]) -> Liste
 
 
 class PageHandler(BaseHTTPRequestHandler):
-    """A connection of a browser."""
-
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True  # else the body waits up to 40 ms for the header
     wbufsize = -1  # header and body leave together

@@ -67,7 +67,6 @@ class ShownRoof:
 
     @property
     def path(self) -> Path | None:
-        """The file that it was read from."""
         return None if self.outcome.project is None else self.outcome.project.path
 
     @property

@@ -52,7 +52,6 @@ class Variant:
 
     @cached_property
     def data(self) -> dict[str, Any]:
-        """Its name and key figures."""
         return {"name": self.name, "figures": figures_data(self.surface, self.certificate)}
 
 
@@ -222,7 +221,7 @@ class Session:
         late = until(stop, FOLLOW_SECONDS * (1.0 + state.wanted.m / 50_000))
         way = reach(state.surface, state.wanted, late, attempts=2, **FOLLOW)
         failed = way.failed if way.certificate is None else None
-        return state if stop() else state.following(replace(way, failed=failed), way.certificate)
+        return state if stop() else state.following(way._replace(failed=failed), way.certificate)
 
     @act(moves=True)
     def settle(self, state: SessionState, stop: Stop, values: Values) -> SessionState:
@@ -299,7 +298,6 @@ class Session:
 
     @act()
     def forget(self, state: SessionState, stop: Stop, number: int) -> SessionState:
-        """Remove a variant."""
         gone, compared = state.variant(number), state.compared
         if compared is not None and compared >= number:
             compared = None if compared == number else compared - 1

@@ -17,27 +17,43 @@ def rigid_motions(surface: Surface) -> Floats:
     Entry (i,0) is the translation, (i,1) the rotation vector, scaled so that the six are orthonormal
     when lengths are measured in sizes of the surface.
     """
-    size = surface.size or 1.0  # 0 where all vertices are at one point
-    arm = (surface.vertices - surface.vertices.mean(axis=0)) / size
-    held, free = surface.fixed & ~members(surface.on_line, surface.n), np.eye(6)
+    X, size, free = surface.vertices, surface.size or 1.0, np.eye(6)  # 0 where all vertices are at one point
     if surface.periodic or not surface.free.all():
-        rows = [_row(arm[held], axis) for axis in np.eye(3)]
-        for line, along in surface.on_line:
-            if isinstance(line, Circle):
-                outward = surface.vertices[along] - np.array(line.centre)
-                across = [np.array(line.normal), outward / line.radius]
-            else:
-                across = list(perpendicular(np.array([line.direction])))
-            rows += [_row(arm[along], axis) for axis in across]
-        rows += [_row(arm[mask], np.array(plane.normal)) for plane, mask in surface.sliding]
-        between = arm[surface.images[:, 0]] - arm[surface.images[:, 1]]  # rotations would turn translations
-        rows += [_row(between, axis) * [0, 0, 0, 1, 1, 1] for axis in np.eye(3)]
-        resisted = np.concatenate(rows)
-        _, s, vt = np.linalg.svd(resisted.T @ resisted)
-        free = vt[s <= 1e-10 * s[0]]
+        elsewhere = surface.onto_supports(X + size * np.cos(1.618 * np.arange(X.size)).reshape(-1, 3))
+        here, there = _resisted(surface, X), _resisted(surface, elsewhere)
+        free = _unresisted(here)
+        # a flat half turns about its two masts: out of its mirror plane, but not with the first step
+        if len(_unresisted(there)) < len(free):
+            free = _unresisted(here + there)
     motions = free.reshape(-1, 2, 3).copy()
     motions[:, 1] /= size
     return motions
+
+
+def _resisted(surface: Surface, X: Floats) -> Floats:
+    """(6,6) RᵀR of the rows R of velocities that supports resist at X (n,3), about the surface's centroid."""
+    size = surface.size or 1.0
+    arm = (X - surface.vertices.mean(axis=0)) / size
+    held = surface.fixed & ~members(surface.on_line, surface.n)
+    rows = [_row(arm[held], axis) for axis in np.eye(3)]
+    for line, along in surface.on_line:
+        if isinstance(line, Circle):
+            outward = X[along] - np.array(line.centre)
+            across = [np.array(line.normal), outward / line.radius]
+        else:
+            across = list(perpendicular(np.array([line.direction])))
+        rows += [_row(arm[along], axis) for axis in across]
+    rows += [_row(arm[mask], np.array(plane.normal)) for plane, mask in surface.sliding]
+    between = np.subtract(*surface.vertices[surface.images.T]) / size  # rotations would turn these
+    rows += [_row(between, axis) * [0, 0, 0, 1, 1, 1] for axis in np.eye(3)]
+    resisted = np.concatenate(rows)
+    return np.asarray(resisted.T @ resisted)
+
+
+def _unresisted(resisted: Floats) -> Floats:
+    """(k,6) what of the six motions is resisted nowhere."""
+    _, s, vt = np.linalg.svd(resisted)
+    return np.asarray(vt[s <= 1e-10 * s[0]])
 
 
 def rigid_modes(space: MotionSpace, motions: Floats, X: Floats) -> tuple[Floats, Floats]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,8 +17,7 @@ from .georeference import Georeference
 LOST = ("order", "images")
 
 
-@dataclass(frozen=True)
-class Format:
+class Format(NamedTuple):
     """What a file format can hold besides the triangles and the patches' names."""
 
     module: str  # the module here that reads and writes it
@@ -51,8 +49,7 @@ class Format:
         return [part.words.format(unit=units.length) for part in parts if part.there(surface, units)]
 
 
-@dataclass(frozen=True)
-class Content:
+class Content(NamedTuple):
     """What a writer gets besides a surface."""
 
     metadata: str  # the text of ``metadata_text``

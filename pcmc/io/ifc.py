@@ -60,12 +60,8 @@ def write(path: Path, surface: Surface, content: Content) -> None:
         model.add_properties("Pcmc_Certificate", roof, _findings(content.certificate))
     texts = {"Description": content.metadata} | ({} if content.walls is None else {"Walls": content.walls})
     model.add_properties("Pcmc_Surface", roof, {name: ("IfcText", text) for name, text in texts.items()})
-    areas = patch_areas(surface) * model.square_metres
     place = roof.ObjectPlacement
-    parts = [
-        model.add_part(k, color, used, faces, float(areas[k]), place)
-        for k, color, used, faces in patch_meshes(surface)
-    ]
+    parts = [model.add_part(*mesh, place) for mesh in patch_meshes(surface)]
     parts += [model.add_cable(cable, place) for cable in surface.cables]
     parts += [model.add_member(line, place) for line in content.members]
     model.aggregate("roof's parts", roof, parts)
@@ -83,6 +79,7 @@ class _Model:
 
         self.surface, self.units = surface, units
         self.square_metres = length_factor(units.length, "m") ** 2  # in the roof's unit of area
+        self.areas = patch_areas(surface) * self.square_metres
         self.name, self.place = ", ".join(filter(None, ("Roof", content.mark))), content.georeference
         self.replaced = {member.wall for member in content.members}
         self.cable_areas = content.cable_areas
@@ -160,7 +157,7 @@ class _Model:
             Scale=length_factor(self.units.length, "m"),
         )
 
-    def add_part(self, k: int, color: Floats, used: Ints, faces: Ints, area: float, place: Any) -> Any:
+    def add_part(self, k: int, color: Floats, used: Ints, faces: Ints, place: Any) -> Any:
         """The element of patch k, with its vertices and triangles as in ``patch_meshes``."""
         surface, patch = self.surface, self.surface.patches[k]
         points = (surface.vertices[used] - self.middle).tolist()
@@ -181,7 +178,7 @@ class _Model:
             "Pressure": (per_area, patch.pressure),
             "Weight": (per_area, patch.weight),
             "Snow": (per_area, patch.snow),
-            "Area": ("IfcAreaMeasure", area),
+            "Area": ("IfcAreaMeasure", float(self.areas[k])),
             "Supports": ("IfcText", "".join(map(str, support_of(surface)[used].tolist()))),
         }
         if patch.tension > 0.0 and not patch.weight:  # with one it differs from place to place

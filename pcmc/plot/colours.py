@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,8 +21,7 @@ SHADES = (0.5, 1.06)  # brightness of a sheet, lit or not, of its colour's
 Picture = tuple[Rendering, bool, Image]  # with whether its supports are dots, and (h,w,3) as painted
 
 
-@dataclass(frozen=True)
-class ColorScale:
+class ColorScale(NamedTuple):
     """A colour map between two values."""
 
     low: float

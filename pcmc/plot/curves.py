@@ -275,7 +275,6 @@ def new_axes(width: int, height: int, title: str, x: str, y: str, *scales: str) 
 
 
 def label_axes(axes: Any, x: str, y: str) -> None:
-    """What the axes show."""
     axes.set_xlabel(x, fontsize=TEXT, color=INK, labelpad=2.5)
     axes.set_ylabel(y, fontsize=TEXT, color=INK, labelpad=2.5)
 

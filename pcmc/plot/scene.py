@@ -10,9 +10,8 @@ import math
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -37,8 +36,7 @@ TALLEST = 1.1  # height of a picture at most, as a part of its width
 LIFT = 2e-3  # of the size: lines and dots stand this much before the surface they lie on
 
 
-@dataclass(frozen=True, eq=False)
-class Camera:
+class Camera(NamedTuple):
     """The direction of view: unit vectors right, up and towards the viewer, as rows of (3,3)."""
 
     axes: Floats
@@ -67,8 +65,7 @@ def view_of(surface: Surface, view: str | tuple[float, float]) -> Camera:
     return Camera(np.stack([right, np.cross(towards, right), towards]))
 
 
-@dataclass(frozen=True, eq=False)
-class Rendering:
+class Rendering(NamedTuple):
     """One surface of a picture: where it is seen from and what is shown on it."""
 
     surface: Surface
@@ -98,8 +95,7 @@ class Rendering:
         return self.view.project(X if every else X[self.shown])
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(NamedTuple):
     """Everything that a painter needs.
 
     ``order`` (t + s + d,) numbers triangles, then segments, then dots, farthest first.
@@ -200,8 +196,7 @@ def mean_edge(surface: Surface) -> float:
     return float(np.linalg.norm(P - np.roll(P, 1, axis=1), axis=2).mean())
 
 
-@dataclass(frozen=True, eq=False)
-class Frame:
+class Frame(NamedTuple):
     """A rectangle of pixels and the picture coordinates in it."""
 
     size: tuple[int, int]  # width and height in pixels

@@ -123,7 +123,7 @@ def line_of(text: str, place: Place, key: str, value: Any = None) -> int:
             header = tuple(part.strip("\"'") for part in re.findall(PART, head[1]))
             if header == (*place, key):
                 lines.append((False, False, number))
-        elif named.search(line.split("#")[0]) and header == place[: len(header)]:
+        elif named.search(_code(line)) and header == place[: len(header)]:
             inside = header == place or (last is not None and last.search(line) is not None)
             lines.append((not inside, str(value) not in line, number))
     return min(lines, default=(True, True, 1))[2]
@@ -141,10 +141,15 @@ def line_with(path: Path, found: object) -> int:
     def has(line: str) -> bool:
         if isinstance(found, str):
             return f'"{found}"' in line or f"'{found}'" in line
-        return any(str(float(text)) == str(float(found)) for text in VALUE.findall(line.split("#")[0]))
+        return any(str(float(text)) == str(float(found)) for text in VALUE.findall(_code(line)))
 
     numbers = [number for number, line in enumerate(lines, 1) if has(line)]
     return numbers[0] if len(numbers) == 1 else 0
+
+
+def _code(line: str) -> str:
+    """A line of TOML without its comment."""
+    return re.sub(r"""("[^"]*"|'[^']*')|#.*""", r"\1", line)
 
 
 def _quoted(key: str) -> str:

@@ -135,8 +135,6 @@ def fits(value: Any, schema: Schema) -> bool:
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a project file."""
-
     name: str
     kind: str  # one of ``KINDS``
     default: Any  # where the key is left out; ``REQUIRED`` if it must not be, None for none

@@ -75,7 +75,6 @@ def warn_of_members(outcome: Outcome, what: str, held: bool = False) -> None:
 
 
 def has_members(outcome: Outcome) -> bool:
-    """Whether a project has members."""
     return outcome.project is not None and bool(_members(outcome.project))
 
 

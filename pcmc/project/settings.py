@@ -47,6 +47,8 @@ DOCUMENTS = {  # keys of files for those who build, with their suffixes and what
     "pattern": (PATTERNS, "a cutting pattern"),
     "report": (REPORTS, "a report"),
 }
+SCHEDULE_TABLES = ("", "families", "edges")  # of panels, their families and edges
+TABLES = {"panels": SCHEDULE_TABLES, "pattern": PATTERN_TABLES, "net": NET_TABLES}  # that a .csv is
 SINGLE = ("picture", "panels", "structure", "report")  # keys of one file each
 LISTS = ("files", "drawings", "net", "pattern")  # keys of several files
 NET_KEYS, PICTURE_KEYS = ("net_pattern", "net_direction"), ("view", "views", "colour")
@@ -250,19 +252,17 @@ class Output:
 
     @property
     def names(self) -> list[str]:
-        """The names of the files, as they are given."""
         return [str(name) for key in (*LISTS, *SINGLE) for name in self.files_of(key)]
 
     @property
     def paths(self) -> list[Path]:
         """All files that are known before the roof is; sheets as .svg get numbers."""
-        paths = [*map(Path, self.names), *(schedule_paths(Path(self.panels))[1:] if self.panels else ())]
-        for files, tables in ((self.pattern, PATTERN_TABLES), (self.net, NET_TABLES)):
-            paths += [path for file in files for path in table_paths(Path(file), tables)[1:]]
+        paths = [*map(Path, self.names)]
+        for key, tables in TABLES.items():
+            paths += [path for file in self.files_of(key) for path in table_paths(Path(file), tables)[1:]]
         return paths
 
     def in_folder(self, folder: Path) -> Output:
-        """The same output in a folder."""
         lists: dict[str, Any] = {name: [folder / path for path in getattr(self, name)] for name in LISTS}
         lists |= {name: folder / path for name in SINGLE if (path := getattr(self, name)) is not None}
         return replace(self, **lists)
@@ -318,11 +318,6 @@ def of_material(pattern: CuttingOptions, structure: Structure | None, surface: S
     pattern = replace(pattern, **found)
     pattern.check(surface)  # a warp of the model that is oblique to a mirror plane is named
     return pattern
-
-
-def schedule_paths(path: Path) -> list[Path]:
-    """The files of a schedule of panels: panels, families, edges."""
-    return [path, *(path.with_name(f"{path.stem}-{name}{path.suffix}") for name in ("families", "edges"))]
 
 
 def cost_paths(path: Path) -> list[Path]:

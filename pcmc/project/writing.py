@@ -20,7 +20,7 @@ from ..base.libraries import require
 from ..base.units import NO_UNITS, Units
 from ..certificate.certificate import Certificate
 from ..cloth.sheets import pattern_files
-from ..drawings.drawing_set import net_files
+from ..drawings.drawing_set import net_files, table_paths
 from ..forces.curvature import curvature_error, mean_curvature
 from ..io.mesh_data import CURVATURE
 from ..panelling import Panels
@@ -31,7 +31,7 @@ from .checking import in_file
 from .file import Project
 from .members import filed_besides, warn_of_members
 from .outcome import OnStep, Outcome, ignore
-from .settings import check_picture, cost_paths, schedule_paths
+from .settings import SCHEDULE_TABLES, check_picture, cost_paths
 
 WRITERS = (  # libraries that some formats need, whatever is in the file, with their extras
     ("trimesh", "files", (".glb", ".gltf")),
@@ -162,7 +162,7 @@ def write_all(jobs: FileJobs, progress: OnStep = ignore) -> list[Path]:
 def schedule_jobs(path: Path, schedule: Panels) -> FileJobs:
     """The files of a schedule, each with the function that writes it."""
     tables = (schedule.panels, schedule.families, schedule.edges)
-    paths = schedule_paths(path)
+    paths = table_paths(path, SCHEDULE_TABLES)
     return [(one, partial(table.to_csv, index=False)) for one, table in zip(paths, tables, strict=True)]
 
 

@@ -69,7 +69,6 @@ class RoofReport:
         return Path(path)
 
     def pdf(self) -> bytes:
-        """The bytes of the PDF file."""
         from .pages import pdf  # needs reportlab
 
         title = f"Report on the roof {self.name}" if self.name else "Report on a roof"

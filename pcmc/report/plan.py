@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,7 @@ AROUND = 1.0  # mm kept free around what is drawn
 OFF = 0.6  # of the longest edge: a point farther than this from all vertices of a curve is not on it
 
 
-@dataclass(frozen=True, eq=False)
-class PaperPlan:
+class PaperPlan(NamedTuple):
     """A plan on paper; lines and texts in mm from the lower left corner."""
 
     scale: str  # such as "1:200"

@@ -13,7 +13,8 @@ from ..accuracy import MeshCheck
 from ..base.units import Units
 from ..certificate import Certificate
 from ..certificate.quantities import Figure, dimension_of
-from ..drawings.sheet import column
+from ..certificate.tables import PLACES
+from ..drawings.sheet import DIGITS, column
 from ..panelling import Panels
 from ..surface import Surface
 from .plan import PaperPlan
@@ -178,9 +179,12 @@ def columns_in(table: pd.DataFrame, units: Mapping[str, str]) -> Columns:
 
     >>> columns_in(pd.DataFrame({"least_force": [1.0, 2.0], "area": [3.0, 4.0]}), {"least_force area": "m"})
     {'least force, m': ['1.000', '2.000'], 'area, m': ['3.000', '4.000']}
+    >>> columns_in(pd.DataFrame({"x": [691006.4]}), {"x": "m"})
+    {'x, m': ['691006.400']}
     """
     pairs = [(key, unit) for keys, unit in units.items() for key in keys.split()]
-    return {f"{key.replace('_', ' ')}, {unit}": column(table[key]) for key, unit in pairs}
+    far = {key: 9 for key, _ in pairs if key in PLACES and table[key].abs().max() >= 1e5}  # of a survey
+    return {f"{k.replace('_', ' ')}, {unit}": column(table[k], far.get(k, DIGITS)) for k, unit in pairs}
 
 
 def small(value: float) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.errors import OptionError
 from ..base.tolerances import AT_REST, COLLAPSED, NOISE, POOR, ROUNDED_REST, SHRUNK
-from ..base.validate import check_options, choice, integer, number, option
+from ..base.validate import check_options, choice, integer, limited, number
 from ..forces.functional import patch_areas
 from ..forces.loose_parts import patch_residuals
 from ..meshing.quality import worst_quality
@@ -55,12 +55,12 @@ class NewtonOptions:
         rest on Π, they stay flat.
     """
 
-    tolerance: float = option(1e-12, number, above=0.0)
-    iterations: int = option(200, integer)
-    target: str = option("minimum", choice, known=TARGETS)
-    levels: int = option(0, integer)
-    min_quality: float = option(0.45, number, least=0.0, below=1.0)
-    inflation: float = option(10.0, number, above=1.0)
+    tolerance: float = limited(1e-12, number, above=0.0)
+    iterations: int = limited(200, integer)
+    target: str = limited("minimum", choice, known=TARGETS)
+    levels: int = limited(0, integer)
+    min_quality: float = limited(0.45, number, least=0.0, below=1.0)
+    inflation: float = limited(10.0, number, above=1.0)
     backend: str | None = None
     order: int | None = None
 

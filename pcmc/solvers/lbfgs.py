@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.tolerances import COLLAPSED
-from ..base.validate import check_options, integer, number, option
+from ..base.validate import check_options, integer, limited, number
 from ..meshing.quality import worst_quality
 from ..surface import Surface
 from .evaluate import Evaluator, Point
@@ -39,10 +39,10 @@ class LbfgsOptions:
     inflation : diverged when the bounding box is more than this many times its first diagonal.
     """
 
-    tolerance: float | None = option(1e-8, number, least=0.0)
-    evaluations: int = option(2000, integer, least=1)
-    memory: int = option(10, integer, most=1000)
-    inflation: float = option(10.0, number, above=1.0)
+    tolerance: float | None = limited(1e-8, number, least=0.0)
+    evaluations: int = limited(2000, integer, least=1)
+    memory: int = limited(10, integer, most=1000)
+    inflation: float = limited(10.0, number, above=1.0)
     __post_init__ = check_options
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import OptionError
-from ..base.validate import check_options, choice, flag, integer, number, option
+from ..base.validate import check_options, choice, flag, integer, limited, number
 from ..surface import Surface
 from .evaluate import Evaluator, Point
 from .result import Callback, Progress, Result, Status, until_stopped
@@ -39,17 +39,17 @@ class NesterovOptions:
     inflation : diverged when the bounding box is more than this many times its first diagonal.
     """
 
-    t0: float = option(0.01, number, above=0.0)
-    gamma: float = option(0.9, number, least=0.0, below=1.0)
-    xi: float = option(0.2, number, least=0.0)
-    tau: float = option(0.5, number, above=0.0, below=1.0)
-    floor_power: int = option(5, integer)
-    momentum: bool = option(True, flag)
-    line_search: bool = option(True, flag)
-    armijo: str = option("printed", choice, known=("printed", "sufficient"))
-    tolerance: float | None = option(1e-8, number, least=0.0)
-    iterations: int = option(1000, integer)
-    inflation: float = option(10.0, number, above=1.0)
+    t0: float = limited(0.01, number, above=0.0)
+    gamma: float = limited(0.9, number, least=0.0, below=1.0)
+    xi: float = limited(0.2, number, least=0.0)
+    tau: float = limited(0.5, number, above=0.0, below=1.0)
+    floor_power: int = limited(5, integer)
+    momentum: bool = limited(True, flag)
+    line_search: bool = limited(True, flag)
+    armijo: str = limited("printed", choice, known=("printed", "sufficient"))
+    tolerance: float | None = limited(1e-8, number, least=0.0)
+    iterations: int = limited(1000, integer)
+    inflation: float = limited(10.0, number, above=1.0)
 
     def __post_init__(self) -> None:
         check_options(self)

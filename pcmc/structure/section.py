@@ -303,7 +303,12 @@ class Structure:
             _name_oblique_warps(structure.materials(whole), surface)
             return structure.check(whole, plan)
         self.thicknesses(surface)
-        _name_oblique_warps(self.materials(surface), surface)
+        _name_oblique_warps(of := self.materials(surface), surface)
+        heavy = [part.name for part in (*surface.patches, *surface.cables) if part.weight]
+        own = of if isinstance(of, Mapping) else dict.fromkeys(heavy, of)
+        if twice := [name for name in heavy if own.get(name, self.material).density]:
+            text = f"{twice[0]!r} has a weight, under which it is at rest; self-weight by its density comes"
+            warnings.warn(f"{text} on top; if both are the same, leave one out", LoadWarning, stacklevel=3)
         members = members_of(self.members, plan)
         lines = lines_on(surface, members)
         check_loads(self.loads_on(surface), surface, [line.wall for line in lines])

@@ -90,11 +90,8 @@ def run(
     with ExitStack() as stack:
         stored = None if store is None else stack.enter_context(open_store(store, sweep))
         records = {} if stored is None else dict(stored.records)
-        todo = {
-            number: parameters
-            for number, parameters in enumerate(sweep)
-            if number not in records or (retry_failed and records[number].failed)
-        }
+        kept = {number for number, record in records.items() if not (retry_failed and record.failed)}
+        todo = {number: parameters for number, parameters in enumerate(sweep) if number not in kept}
         if on_resume is not None:
             on_resume(len(sweep) - len(todo), len(todo))
         if todo:

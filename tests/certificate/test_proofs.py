@@ -8,12 +8,12 @@ from shapes import pyramid, tube
 from starts import spherical_cap, two_squares
 
 from generators.grid import grid_faces
-from pcmc import Cable, Patch, Plane, Surface, Verdict, certify, cut, margin, solve, solvers
+from pcmc import Cable, Patch, Plane, Surface, Verdict, certify, cut, margin, solve
 from pcmc.base.errors import NoBranch, SurfaceError
 from pcmc.certificate.balance import load_is_given, load_ratio, overload
 from pcmc.certificate.cables import weak_cable
 from pcmc.plan import Plan
-from pcmc.solvers import solve_once
+from pcmc.solvers import homotopy, solve_once
 from pcmc.solvers.continuation import Direction, Ending, follow
 from pcmc.solvers.result import Status
 
@@ -314,7 +314,7 @@ def test_a_fault_on_a_branch_is_not_a_branch_that_does_not_start(monkeypatch):
     def broken(*_, **__):
         raise SurfaceError("a fault")
 
-    monkeypatch.setattr(solvers.homotopy, "follow", broken)
+    monkeypatch.setattr(homotopy, "follow_until", broken)
     with pytest.raises(SurfaceError, match="a fault"):
         solve(spherical_cap(0.25, alpha=0.45))
 

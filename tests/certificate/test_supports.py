@@ -255,3 +255,9 @@ def test_forces_of_a_rim_that_cancel_are_zero():
     assert rim == [0.0, 0.0, 0.0]
     assert certificate.support == 0.0
     assert certificate.supports["per_length_max"][0] > 5.0
+
+
+def test_places_in_the_coordinates_of_a_survey_are_told_apart():
+    corners = [[691000 + x, 5334000 + y] for x, y in ((0, 0), (6, 0), (6, 4), (0, 4))]
+    row = str(pcmc.certify(Plan(corners, edge_length=2.0, tension=3.0).surface())).splitlines()[-1]
+    assert " 691003 5334002 " in row

@@ -408,6 +408,8 @@ def test_the_stretch_is_what_a_tension_undoes():
     by_patch = CuttingOptions(strips=1, stiffness=(200.0, 100.0), poisson={"other": 0.2})
     assert usual == by_patch.stretch(4.0, "roof")[1]
     assert usual == CuttingOptions(strips=1, stiffness=(200.0, 100.0), poisson=0.3).stretch(4.0)[1]
+    with pytest.raises(OptionError, match=r"compensation of 'a', from its stiffness: .* found 73\.6842"):
+        CuttingOptions(strips=1, stiffness=(1.0, 1.0)).stretch(4.0, "a")
     assert CuttingOptions(strips=1, compensation=(20.0, 0.0)).stretch(4.0) == (0.8, 1.0)
     with pytest.raises(OptionError, match="compensation"):
         CuttingOptions(strips=1, compensation=(20.1, 0.0))

@@ -35,6 +35,7 @@ from pcmc.project import build, load, reference, run, sections
         ("[solve]", "[plan.plane]\nnormall = [0, 0, 1]\n[solve]", 8, "plan.plane.normall", "normal"),
         ("[output]", "[[remesh]]\nedge_length = 1\n[[remesh]]\nwen = 1\n[output]", 13, "remesh.wen", "when"),
         ("[output]", "[targets]\nmeet = []\nvaryy = []\n[output]", 12, "targets.varyy", "vary"),
+        ("[solve]", '[plan.rooms]\n"a # b" = {volum = 1}\n[solve]', 8, "plan.rooms.a # b.volum", "volume"),
         ("[solve]", '[plan.rooms."a.b"]\nvolum = 1\n[solve]', 8, "plan.rooms.a.b.volum", "volume"),
         (
             "[output]",

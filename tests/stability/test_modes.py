@@ -9,10 +9,11 @@ from starts import double_bubble, sphere, two_squares
 
 import pcmc
 from generators import four_fans
-from pcmc import Patch, Surface, hessian
+from pcmc import Patch, Surface, certify, hessian, mirrored, solve
 from pcmc.forces.motion_space import motion_space, vertex_classes
 from pcmc.forces.pattern import Pattern
 from pcmc.forces.rigid_motions import rigid_modes, rigid_motions
+from pcmc.plan import Plan
 from pcmc.stability import modes
 from pcmc.stability.bordered import negatives_without
 from pcmc.stability.equilibrium import Equilibrium
@@ -169,6 +170,16 @@ def test_an_ordinary_roof_has_no_rigid_motion():
     for surface in (pyramid(), two_squares(3), three_patches(plane=TILTED)):
         assert len(rigid_motions(surface)) == 0
         assert system_of(surface).of.excluded.shape[1] == 0
+
+
+def test_a_flat_half_does_not_turn_about_its_masts():
+    """The first step of that turn keeps points in the mirror plane. It is the lowest mode of the whole."""
+    rim, side = [[0, 0], [6, 0], [6, 8], [0, 8]], [[[6, 0], [6, 8]]]
+    sail = {"edge": "cable", "cable": 16.0, "supports": [[0, 0], [0, 8]], "tension": 1.0, "pressure": 0.0}
+    half = solve(Plan(rim, mirrors=side, edge_length=2.0, **sail).surface())
+    assert len(rigid_motions(half.surface)) == 0
+    whole = certify(mirrored(half.surface))
+    assert half.certificate.eigenvalues[0] == pytest.approx(whole.eigenvalues[0], rel=1e-6)
 
 
 def test_a_spheres_turning_only_slides_it():

@@ -6,8 +6,8 @@ import pytest
 from refusals import refused
 from structures import model_of, pyramid
 
-from pcmc import Material, SelfWeight, Snow, Wind
-from pcmc.base.errors import OptionError
+from pcmc import Cable, Material, SelfWeight, Snow, Wind
+from pcmc.base.errors import LoadWarning, OptionError
 from pcmc.project import Structure
 
 
@@ -65,3 +65,16 @@ def test_bad_models_are_refused(given, what):
 def test_bad_materials_and_loads_are_refused(make, what):
     with refused(OptionError, what=what):
         make()
+
+
+def test_a_weight_and_a_density_of_one_patch_are_told():
+    """Both act: of a roof found under its own weight that would be twice the weight."""
+    roof = pyramid().retensioned(weights={"roof": 0.01})
+    told = r"'roof' has a weight, under which it is at rest; self-weight by its density comes on top"
+    with pytest.warns(LoadWarning, match=told):
+        Structure(young=1e6, thickness=0.001, density=1.0).check(roof)
+    Structure(young=1e6, thickness=0.001).check(roof)
+    roped = pyramid().rebuilt(cables=[Cable("rope", 1.0, [[0, 4]], weight=0.1)])
+    with pytest.warns(LoadWarning, match="'rope' has a weight"):
+        Structure(young=1e6, thickness=0.001, density=1.0, cable_area=1e-4).check(roped)
+    Structure(young=1e6, thickness=0.001, density=1.0).check(pyramid())

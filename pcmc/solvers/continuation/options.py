@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from ...base.validate import check_options, choice, integer, number, option, positive, refuse
+from ...base.validate import check_options, choice, integer, limited, number, positive, refuse
 
 CONTROLS = ("arclength", "parameter", "volume", "height")
 
@@ -56,16 +56,16 @@ class FollowOptions:
     pcmc.base.errors.OptionError: step: expected a number ≠ 0, with the sign of...
     """
 
-    control: str = option("arclength", choice, known=CONTROLS)
-    step: float = option(0.05, number)
-    smallest: float = option(1e-5, positive)
+    control: str = limited("arclength", choice, known=CONTROLS)
+    step: float = limited(0.05, number)
+    smallest: float = limited(1e-5, positive)
     largest: float = 0.15
-    steps: int = option(200, integer)
-    tolerance: float = option(1e-10, positive)
-    folds: int | None = option(None, integer, least=1)
-    min_quality: float = option(0.45, number, least=0.0, below=1.0)
-    remesh: float | None = option(None, positive)
-    keep: int = option(1, integer, least=1)
+    steps: int = limited(200, integer)
+    tolerance: float = limited(1e-10, positive)
+    folds: int | None = limited(None, integer, least=1)
+    min_quality: float = limited(0.45, number, least=0.0, below=1.0)
+    remesh: float | None = limited(None, positive)
+    keep: int = limited(1, integer, least=1)
     backend: str | None = None
 
     def __post_init__(self) -> None:
