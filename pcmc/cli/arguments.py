@@ -32,7 +32,7 @@ from .options import by_part, option, parsed_unit, switch
 
 READ = (TOML, *FORMATS, *READ_ONLY, DXF)  # suffixes of what commands read
 
-EVERY = "A bare VALUE applies to every patch that is not named"
+EVERY = "A bare VALUE applies to every patch that is no wall and not named"
 CABLES = "A bare VALUE applies to all that are not named"
 LOADED = "A bare VALUE applies to every patch under pressure that is not named"
 UPDATED = "wall pressures are updated"

@@ -29,7 +29,7 @@ from .settings import PATCH_KEYS, AccuracyWanted, MeshFile, Output, Remeshing
 CHECKED = "whether to solve on finer meshes, too, for error bars; see ``pcmc.check_mesh``"
 MARGIN = "how far it is from the edge: pressure, snow or such as tension of NAME; see ``pcmc.margin``"
 PROVED = "whether to prove that an exact equilibrium is near; see ``pcmc.verify``"
-VARIED = "what may change; a name is a patch whose tension may, a list of names several with one tension"
+VARIED = "what may change; a name is a patch or cable whose tension may, a list of names all that share one"
 REQUIRED = MISSING  # the default of a key that must be given
 EXAMPLES = {  # what to type for keys that must be given, and for some that a beginner takes for others
     "plan": "[plan] with outline = [[0, 0], [12, 0], [12, 8], [0, 8]] and tension = 4.0",
