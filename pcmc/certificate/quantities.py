@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base import validate
+from ..base.arrays import mask_of
 from ..base.errors import OptionError
 from ..forces.cables import pull_along
 from ..forces.rooms import refuse_varied_pressure
@@ -27,7 +28,7 @@ FACTOR = 20.0  # a parameter without bounds may change by this factor, up or dow
 QUANTITIES = {
     "apex": "length",  # greatest height over Π
     "height": "length",  # height over Π at a point; of a patch the greatest, below Π the least
-    "rise": "length",  # apex less the height of the lowest support
+    "rise": "length",  # apex less the height of the lowest support of a sheet
     "area": "area",  # Σ A_T
     "volume": "volume",  # ∫ z ν·n dA, the volume between patch and Π
     "energy": "energy",  # E = Σ α A - Σ p V, with cables and weights
@@ -121,8 +122,9 @@ def figures(surface: Surface, certificate: Certificate) -> list[Figure]:
             add(cable.name, "cable", {"sag": float(np.linalg.norm(out, axis=1).max())})
     for room in surface.rooms:
         add(room.name, "room", {"volume": room.volume})
-    lowest = height[surface.supported].min() if surface.supported.any() else height.min()
-    apex = float(height[surface.faces[roof[surface.patch_of_face]]].max())
+    sheets = mask_of(surface.faces[roof[surface.patch_of_face]], surface.n)
+    held = sheets & surface.supported
+    apex, lowest = float(height[sheets].max()), height[held if held.any() else sheets].min()
     whole = {
         "apex": apex,
         "rise": apex - float(lowest),

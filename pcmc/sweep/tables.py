@@ -105,8 +105,8 @@ def columns_of(table: pd.DataFrame, name: str, parameters: Container[str] = ()) 
 def short_table(table: pd.DataFrame, parameters: Sequence[str], show: Sequence[str] = ()) -> pd.DataFrame:
     """The parameters, how each case ended, and quantities, each as of ``columns_of``, in the surface's units.
 
-    By default these are the apex of each patch over Π; the rise of the highest apex over the lowest support,
-    the area and the largest reaction per length of the roof; and the margins, with what ends each.
+    By default these are the apex of each patch over Π; the rise of the highest apex over the lowest support
+    of a sheet, the area and the largest reaction per length of the roof; and the margins, with their ends.
 
     >>> import pandas as pd
     >>> frame = pd.DataFrame({"a": [1.0], "verdict": ["stable"], "residual": [1e-12], "west.apex": [2.0]})

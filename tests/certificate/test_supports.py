@@ -187,6 +187,14 @@ def test_where_snow_lies_on_one_patch_the_others_have_none_as_a_number():
     assert [shown["net pressure", name] for name in areas] == [0.7, 1.0]
 
 
+def test_a_rise_is_over_the_outline_and_not_over_the_bottom_of_a_wall():
+    """As the key ``rise`` of a plan is; the wall stands on Π, 4 below the outline."""
+    outline = [[0, 0, 4], [6, 0, 4], [6, 5, 4], [0, 5, 4]]
+    roof = Plan(outline, [[[3, 0], [3, 5]]], edge_length=2.0, tension=5.0).surface()
+    shown = {f.quantity: f.value for f in figures(roof, pcmc.certify(roof)) if f.owner == "roof"}
+    assert shown["rise"] == pytest.approx(shown["apex"] - 4.0)
+
+
 def test_upright_walls_hold_what_neighbours_of_unequal_tension_leave():
     """A long hall of tensions 5 and 4: far from its ends the plane takes their difference."""
     patches = {"west": {"tension": 5.0}, "east": {"tension": 4.0}}
