@@ -160,8 +160,8 @@ class PatchSpec:
     tension : α, force/length.
     pressure : p, force/area.
     weight : of the patch, force per area of the patch, against Π's normal; negative for a lift.
-    snow : s, force per area of the plan; by default that of the plan or file. A load s on the plan area has the
-        potential s V, so it acts as a lower pressure, p - s; ``pressure`` stays that of the air.
+    snow : s, force per area of the plan; by default that of the plan or file. A load s on the plan area has
+        the potential s V, so it acts as a lower pressure, p - s; ``pressure`` stays that of the air.
     volume : of the room under the patch, between its walls, length³, instead of a pressure, which is then a
         result. A patch with a negative volume hangs below Π.
     at : a point [x, y] inside the patch, or a point in each of its parts. If no patch has one, the
