@@ -303,9 +303,10 @@ class Structure:
             _name_oblique_warps(structure.materials(whole), surface)
             return structure.check(whole, plan)
         self.thicknesses(surface)
-        _name_oblique_warps(of := self.materials(surface), surface)
+        materials = self.materials(surface)
+        _name_oblique_warps(materials, surface)
         heavy = [part.name for part in (*surface.patches, *surface.cables) if part.weight]
-        own = of if isinstance(of, Mapping) else dict.fromkeys(heavy, of)
+        own = materials if isinstance(materials, Mapping) else dict.fromkeys(heavy, materials)
         if twice := [name for name in heavy if own.get(name, self.material).density]:
             text = f"{twice[0]!r} has a weight, under which it is at rest; self-weight by its density comes"
             warnings.warn(f"{text} on top; if both are the same, leave one out", LoadWarning, stacklevel=3)

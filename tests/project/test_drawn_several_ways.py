@@ -17,6 +17,9 @@ from pcmc import project
 
 Text = dict[str, Any]
 Numbers = dict[tuple[str, ...], np.ndarray]
+# a patch that is heavy in the form, too: what both weights do is compared
+pytestmark = pytest.mark.filterwarnings("ignore:.* comes on top:pcmc.base.errors.LoadWarning")
+
 CIRCLE = {"centre": [9.5, 4.0], "radius": 1.0}
 HALL: Text = {
     "units": "m",
