@@ -101,7 +101,7 @@ class Certificate:
 
     @property
     def curvature_error(self) -> float:
-        """The largest |H - H̄|/H̄ by the variational definition."""
+        """The largest |H - H̄|/H̄ by the variational definition, 0 if no patch has a pressure or a weight."""
         return _largest(self.patches["variational_max"])
 
     @cached_property
@@ -238,6 +238,7 @@ class Certificate:
     def text(self, units: Units = NO_UNITS) -> str:
         """The findings as a table, with the units of its numbers if they are given."""
         lowest, sums, force = self.eigenvalues, (self.load, self.support), units.behind("force")
+        relative = self.patches["variational_max"].notna()  # of a sail without a load no error is
         rows = [
             ("verdict", self.verdict.value),
             ("", self.detail),
@@ -248,7 +249,7 @@ class Certificate:
             ("Morse index", "-" if self.index is None else str(self.index)),
             ("of motions", "" if not self.symmetric_in else f"symmetric in {', '.join(self.symmetric_in)}"),
             ("lowest eigenvalue", f"{lowest[0]:.4g}{units.behind('eigenvalue')}" if len(lowest) else "-"),
-            ("curvature error", f"{self.curvature_error:.2e}"),
+            ("curvature error", f"{self.curvature_error:.2e}" if relative.any() else "-"),
             ("triangle quality", f"{self.quality:.3f} (sliding walls {self.walls_quality:.3f})"),
             ("pinched vertices", str(len(self.pinched))),
             ("walls lean", ", ".join(tables.lean_texts(self.leaning, self.acting.surface.size))),
