@@ -190,10 +190,10 @@ def test_where_snow_lies_on_one_patch_the_others_have_none_as_a_number():
 def test_a_sail_without_pressure_has_no_relative_error_of_curvature():
     """Its target is 0. Any shape of it, at rest or not, had "curvature error 0.00e+00"."""
     rim = [[0, 0, 1], [6, 0, 0], [6, 5, 1], [0, 5, 0]]
-    for pressure, shown in ((0.0, "-"), (0.1, "e")):
+    for pressure in (0.0, 0.1):
         sail = Plan(rim, edge_length=2.0, tension=2.0, pressure=pressure).surface()
         (line,) = [line for line in pcmc.certify(sail).text().splitlines() if "curvature error" in line]
-        assert shown in line.split()[-1] and (line.split()[-1] == "-") == (pressure == 0.0)
+        assert (line.split()[-1] == "-") == (pressure == 0.0)
 
 
 def test_a_rise_is_over_the_outline_and_not_over_the_bottom_of_a_wall():
