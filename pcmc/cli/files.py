@@ -167,10 +167,8 @@ def _example(name: str, parameters: dict[str, Any]) -> Surface:
 
 
 GAP = "Gaps between lines up to this length are closed; by default a thousandth of the outline's diagonal."
-LAYERS = (
-    "Layers: outline, divider NAME, hole NAME, upright NAME, cable NAME, free, mirror, support, mast NAME,"
-)
-LAYERS += " height, patch NAME."
+LAYERS = "Layers: outline, divider NAME, hole NAME, upright NAME, cable NAME, free, mirror, support,"
+LAYERS += " mast NAME, height, patch NAME."
 REFER = "Refer to the drawing, so that the project follows it."
 MESH = "A mesh: .obj .ply .stl .off .dae .3ds .x3d and others."
 WELD = "Vertices nearer to each other than this become one; by default 1e-5 of the mesh's size."

@@ -215,11 +215,13 @@ class Branch:
 
 def _traced(parameter: Direction | BoundaryMotion, tracer: Tracer) -> Branch:
     """The branch that a tracer follows to its end."""
-    end = until_stopped(tracer.run, (Ending.STOPPED, ""))
+    ending, detail = until_stopped(tracer.run, (Ending.STOPPED, ""))
     columns = list(tracer.event("", tracer.here.state, 0.0, 0, 0))
     points, events = pd.DataFrame(tracer.rows), pd.DataFrame(tracer.events, columns=columns)
     at_events = dict(enumerate(events.pop("surface")))
-    return Branch(parameter, points, events, tracer.surfaces, *end, at_events, tracer.line, tracer.options)
+    return Branch(
+        parameter, points, events, tracer.surfaces, ending, detail, at_events, tracer.line, tracer.options
+    )
 
 
 def follow(
